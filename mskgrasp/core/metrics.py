@@ -224,7 +224,7 @@ def bootstrap_interval(
     return float(low), float(high)
 
 
-def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[float, float]:
+def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[float, float] | None:
     """Confidence interval of the root mean square of errors over clusters of alike ones, such as parts.
 
     Student's t interval of its logarithm, whose standard error is that of the jackknife over whole clusters
@@ -235,10 +235,13 @@ def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[flo
     Args:
         errors: (n_i,) errors of each cluster, at least one.
         level: Confidence level.
+
+    Returns:
+        The interval; None of fewer than three clusters: two, with one degree of freedom, bound nothing.
     """
     k = len(errors)
-    if k < 2:
-        return float("nan"), float("nan")
+    if k < 3:
+        return None
     squares = np.array([float((np.asarray(one, dtype=np.float64) ** 2).sum()) for one in errors])
     counts = np.array([len(one) for one in errors], dtype=np.float64)
     total = float(squares.sum() / counts.sum())

@@ -189,11 +189,11 @@ def shape_problems(arrays: Mapping[str, np.ndarray]) -> Iterator[str]:
 
 def problems(attempts: Attempts) -> Iterator[str]:
     """Find contradictions of the schema in attempts, a sentence each."""
-    n = len(attempts)
     wrong = list(shape_problems({name: getattr(attempts, name) for name in COLUMNS}))
     yield from wrong
     if wrong:
         return  # values of arrays with wrong shapes cannot be compared
+    n = len(attempts)
     for name, column in COLUMNS.items():
         array = getattr(attempts, name)
         if column.finite == "none":
@@ -202,10 +202,11 @@ def problems(attempts: Attempts) -> Iterator[str]:
         bad = np.flatnonzero(rows & ~np.isfinite(array.reshape(n, -1)).all(axis=1)) if n else []
         if len(bad):
             yield f"{name} of attempt {bad[0]} is not finite ({len(bad)} of {int(rows.sum())} such)"
-    unknown = np.flatnonzero(attempts.failure >= len(FAILURES))
+    known = attempts.failure < len(FAILURES)
+    unknown = np.flatnonzero(~known)
     if len(unknown):
         yield f"failure {attempts.failure[unknown[0]]} of attempt {unknown[0]}, legal 0..{len(FAILURES) - 1}"
-    odd = np.flatnonzero((attempts.failure == 0) != attempts.success)
+    odd = np.flatnonzero(known & ((attempts.failure == 0) != attempts.success))
     if len(odd):
         code, held = attempts.failure[odd[0]], bool(attempts.success[odd[0]])
         yield f"attempt {odd[0]} has success {held} with failure {code} ({FAILURES[code]})"

@@ -14,14 +14,14 @@ import numpy as np
 
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
-from mskgrasp.dataset.attempts import ShardInfo, problems
+from mskgrasp.dataset.attempts import ShardInfo, problems, shape_problems
 from mskgrasp.dataset.ranges import range_problems
 from mskgrasp.dataset.shards import read_unchecked, shard_path, success_rate
 from mskgrasp.parts import store
 
 _MOST_MISSING = 100
 """Missing shards of a part that are named one by one."""
-SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity")
+SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand")
 """Properties that all shards of a dataset share."""
 
 
@@ -125,6 +125,8 @@ def _examine(path: Path) -> tuple[_Shard | None, list[str]]:
         return None, [str(error).removeprefix(str(path)).lstrip(": ")]
     with np.errstate(all="ignore"):  # a damaged number may be of any size
         reasons = list(problems(attempts)) or list(range_problems(attempts, info))
+    if any(shape_problems({"grasp": attempts.grasp, "success": attempts.success})):
+        return None, reasons  # its attempts can be neither counted nor compared
     n = len(attempts)
     digest = hashlib.sha256(np.ascontiguousarray(attempts.grasp).tobytes()).hexdigest() if n else ""
     return _Shard(path=path, info=info, n=n, rate=success_rate(attempts.success), grasps=digest), reasons

@@ -22,7 +22,7 @@ from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 Watch = Callable[[Sequence[Path]], Iterable[Path]]
 """Yields each of the files that will be read; may show a progress bar."""
 SMALL = tuple(name for name in COLUMNS if name != "depth")
-_SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise")
+_SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand")
 
 
 def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:

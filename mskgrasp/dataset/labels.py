@@ -185,7 +185,8 @@ def _columns(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     for name in ("displacement", "tilt", "width_after", "pose_tcp_obj_after"):
         made[name] = np.array(made[name])
         made[name][~success] = np.nan
-    made["relative_speed"] = np.where(arrays["relative_speed"] < 0, np.nan, arrays["relative_speed"])
+    for name in ("relative_speed", "finger_force", "friction_pad_part"):  # stored as -1 where unknown
+        made[name] = np.where(arrays[name] < 0, np.nan, arrays[name])
     return {name: made[name].astype(column.dtype) for name, column in COLUMNS.items() if name != "depth"}
 
 

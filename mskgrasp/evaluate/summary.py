@@ -46,7 +46,7 @@ class TrialStatistics:
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.
-        translation_interval: Interval of the RMSE over parts (`rms_interval`); None for a single part.
+        translation_interval: Interval of the RMSE over parts (`rms_interval`); None for fewer than three.
         rotation_interval: The same of the turn.
         translation_rmse_of_zero: RMSE of predicting no displacement for the same grasps.
         rotation_rmse_of_zero: The same of the turn.
@@ -239,8 +239,7 @@ def _rms(errors: np.ndarray) -> float | None:
 
 
 def _interval(errors: np.ndarray, parts: np.ndarray) -> Interval | None:
-    groups = [errors[parts == part] for part in np.unique(parts)]
-    return rms_interval(groups) if len(groups) > 1 else None
+    return rms_interval([errors[parts == part] for part in np.unique(parts)])
 
 
 def _within(trials: Sequence[Trial], compared: Sequence[Trial], distances: np.ndarray) -> list[Share] | None:

@@ -24,6 +24,7 @@ class Checkpoint:
     Attributes:
         fingerprint: Fingerprint of the data; training does not resume with other data.
         samples_version: Version of the samples made from the data; 1 in files that do not name it.
+        sides: Digest of the split (`Sides.digest`); empty in files that do not name it.
         stage: Network that is being trained.
         epoch: Epochs of that stage that are finished.
         history: Metrics of all epochs so far.
@@ -34,6 +35,7 @@ class Checkpoint:
 
     fingerprint: str
     samples_version: int
+    sides: str
     stage: str
     epoch: int
     history: list[EpochMetrics]
@@ -52,7 +54,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         for group in _GROUPS
         for name, value in getattr(checkpoint, group).items()
     }
-    names = ("fingerprint", "samples_version", "stage", "epoch")
+    names = ("fingerprint", "samples_version", "sides", "stage", "epoch")
     progress = {name: getattr(checkpoint, name) for name in names}
     progress["history"] = [one.to_json() for one in checkpoint.history]
     write_whole(path, save(tensors, metadata={"progress": json.dumps(progress)}))
@@ -66,7 +68,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
     """
     try:
         with safe_open(path, framework="pt") as file:
-            progress: dict[str, Any] = {"samples_version": 1} | json.loads(file.metadata()["progress"])
+            progress: dict[str, Any] = {"samples_version": 1, "sides": ""}
+            progress |= json.loads(file.metadata()["progress"])
             groups: dict[str, dict[str, Tensor]] = {group: {} for group in _GROUPS}
             for key in file.keys():
                 group, name = key.split("/", 1)

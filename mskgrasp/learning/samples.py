@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -28,7 +29,7 @@ from mskgrasp.dataset.fingerprint import OUTCOMES
 from mskgrasp.dataset.shards import require_own_name
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
-from mskgrasp.parts.catalogue import Split, read_index, splits_of
+from mskgrasp.parts.catalogue import SPLITS, Split, read_index, splits_of
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, process_count, results
@@ -124,7 +125,7 @@ class Samples:
         rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
         kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
         if not kept:
-            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates))
+            found = ", ".join(f"{rate:.0%}" for rate in sorted(rates) if not math.isnan(rate))
             raise BadDataset(
                 f"no part's success lies in {low:g}..{high:g} (found {found}); widen success_range"
             )
@@ -323,7 +324,9 @@ def _shard_samples(
 def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
     """Assign each part to a side of the split.
 
-    A part keeps its side when other parts join the dataset. Training and validation get one at least.
+    Training and validation get one at least: where one of them would be empty, it takes a part of training or
+    of new_sizes, or one that the name puts on validation; never a test part or one of the catalogue's
+    validation families. A part keeps its side when other parts join the dataset, unless it was taken so.
 
     Args:
         parts: Names.
@@ -332,7 +335,8 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
             those of parts that are not built on this machine, too, and the name for parts without a recipe.
 
     Raises:
-        BadDataset: There are fewer than two parts, or no catalogue.
+        BadDataset: There are fewer than two parts, no catalogue, or no part that training or validation can
+            take.
     """
     if len(parts) < 2:
         raise BadDataset(
@@ -342,19 +346,36 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
     sides: dict[str, Split] = {
         name: "validation" if _name_hash(name) < fraction else "train" for name in parts
     }
+    of_catalogue: dict[str, Split] = {}
     if by == "catalogue":
         index = read_index()
         if not index.parts:
             raise BadDataset(
                 "sides: catalogue needs the catalogue: python -m mskgrasp.parts build --catalogue"
             )
-        sides |= splits_of(parts, index)
+        of_catalogue = splits_of(parts, index)
+        sides |= of_catalogue
     order = sorted(parts, key=_name_hash)
-    if "validation" not in sides.values():
-        sides[order[0]] = "validation"
-    if "train" not in sides.values():
-        sides[order[-1]] = "train"
+    needed: dict[Split, list[str]] = {"validation": order, "train": order[::-1]}
+    for side, candidates in needed.items():
+        count = Counter(sides.values())
+        if not count[side]:
+            spare = [name for name in candidates if _is_spare(sides[name], count, name in of_catalogue)]
+            if not spare:
+                found = ", ".join(f"{count[one]} {one}" for one in SPLITS if count[one])
+                raise BadDataset(
+                    f"no part is left for {side} (by the catalogue: {found}); "
+                    f"collect parts of --parts {side}, too"
+                )
+            sides[spare[0]] = side
     return sides
+
+
+def _is_spare(side: Split, count: Mapping[Split, int], in_catalogue: bool) -> bool:
+    """Whether a part of a side can be given to training or validation, of which one has none."""
+    if side == "new_sizes":
+        return True
+    return count[side] > 1 and (side == "train" or (side == "validation" and not in_catalogue))
 
 
 def _name_hash(name: str) -> float:

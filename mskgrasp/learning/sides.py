@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import torch
@@ -30,6 +31,12 @@ class Sides:
     validation: Tensor
     test: Tensor
     new_sizes: Tensor
+
+    @property
+    def digest(self) -> str:
+        """Hex digest of the rows to train on and to select by: others make another model."""
+        rows = torch.cat([torch.tensor([len(self.training)]), self.training, self.validation])
+        return hashlib.sha256(rows.numpy().tobytes()).hexdigest()
 
 
 def split(samples: Samples, config: LearningConfig) -> Sides:

@@ -56,11 +56,23 @@ class Stage:
         samples: Samples,
         sides: Sides,
         config: LearningConfig,
+        *,
+        seen: Samples | None = None,
     ):
+        """Prepare the training.
+
+        Args:
+            name: Of the network.
+            models: Those that it belongs to.
+            samples: The dataset.
+            sides: Split of the samples.
+            config: Settings.
+            seen: The samples on the models' device, shared with other stages; None: copied there.
+        """
         self.name = name
         self.models, self.samples, self.config = models, samples, config
         self.training_rows, self.rows = sides.training, sides.validation
-        self.seen = samples.on(models.device)
+        self.seen = samples.on(models.device) if seen is None else seen
         self.noise = torch.Generator(models.device)
         self.of_quality = name != "gdn"
         network = models.gqn if self.of_quality else models.gdn

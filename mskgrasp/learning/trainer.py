@@ -117,8 +117,8 @@ def train(
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
-        UsageError: The checkpoint was made from other data, with another version of the samples, or with a
-            transfer that is not wanted.
+        UsageError: The checkpoint was made from other data, with another version or split of the samples, or
+            with a transfer that is not wanted.
         TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()
@@ -133,8 +133,9 @@ def train(
     networks: dict[str, nn.Module] = {
         name: one.gdn if name == "gdn" else one.gqn for name, one in stages.items()
     }
-    saved = _resumable(checkpoint_path, samples, list(stages))
+    saved = _resumable(checkpoint_path, samples, sides, list(stages))
     history: list[EpochMetrics] = list(saved.history) if saved else []
+    seen = samples.on(models.device)  # once: a stage outlives its training until garbage is collected
     for name in list(stages)[list(stages).index(saved.stage) if saved else 0 :]:
         network = networks[name]
         if quality is not None and name == "gqn":
@@ -144,7 +145,7 @@ def train(
             models.gdn.start_from(models.gqn)
         elif name == "gdn":
             models.gdn.features.load_state_dict(stages["transfer"].gqn.features.state_dict())
-        stage = Stage(name, stages[name], samples, sides, config)
+        stage = Stage(name, stages[name], samples, sides, config, seen=seen)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
@@ -155,6 +156,7 @@ def train(
             checkpoint = Checkpoint(
                 fingerprint=samples.fingerprint,
                 samples_version=SAMPLES_VERSION,
+                sides=sides.digest,
                 stage=stage.name,
                 epoch=finished,
                 history=history,
@@ -176,11 +178,12 @@ def train(
     return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history
 
 
-def _resumable(path: Path, samples: Samples, stages: list[str]) -> Checkpoint | None:
+def _resumable(path: Path, samples: Samples, sides: Sides, stages: list[str]) -> Checkpoint | None:
     """The checkpoint that the training goes on with; None where there is none.
 
     Raises:
-        UsageError: It was made from other data, with another version of the samples, or other settings.
+        UsageError: It was made from other data, with another version or split of the samples, or with other
+            settings.
     """
     if not path.exists():
         return None
@@ -192,6 +195,11 @@ def _resumable(path: Path, samples: Samples, stages: list[str]) -> Checkpoint | 
         raise UsageError(
             f"{path} was made with version {saved.samples_version} of the samples, this is version "
             f"{SAMPLES_VERSION}; {remedy}"
+        )
+    if saved.sides != sides.digest:
+        raise UsageError(
+            f"{path} was made with other parts to train on or to validate on (the catalogue may have "
+            f"changed), or does not name them; {remedy}"
         )
     if saved.stage not in stages:
         raise UsageError(f"{path} was made with other settings; {remedy}")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import errno
 import io
 import os
+import select
 import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TextIO
 
 from mskgrasp.core.errors import MskgraspError, UsageError, one_line
 from mskgrasp.runtime.ctrl_c import repeat_dropped_ctrl_c
@@ -50,8 +52,18 @@ def explain_os_error(error: OSError) -> str:
     return f"{error.strerror or error}{place}; {remedy}"
 
 
+def _is_unread(stream: TextIO) -> bool:
+    """Whether it is a pipe whose reader has closed it."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)
+        return any(event & select.POLLERR for _, event in poll.poll(0))
+    except (OSError, ValueError):  # closed, or no file of the system's
+        return False
+
+
 def run(program: str, main: Callable[[], int | None]) -> None:
-    """Run a program's ``main`` and end the process: 0, 1 failure, 2 usage, 130 Ctrl-C.
+    """Run a program's ``main`` and end the process: 0, 1 failure, 2 usage, 130 Ctrl-C, 141 output unread.
 
     An error that a user can repair becomes one line on standard error; anything else is a defect and
     keeps its traceback.
@@ -77,8 +89,12 @@ def run(program: str, main: Callable[[], int | None]) -> None:
         print("stopped by Ctrl-C; what was finished is kept", file=sys.stderr)
         code = 130
     except BrokenPipeError:
-        sys.stderr.close()
-        code = 0
+        unread = [stream for stream in (sys.stdout, sys.stderr) if _is_unread(stream)]
+        if not unread:
+            raise  # another pipe's: a defect
+        for stream in unread:  # what they still hold must not fail again at the exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        code = 128 + signal.SIGPIPE  # as of a process that the signal ends
     except OSError as error:
         if error.filename is None and error.errno not in _FULL:
             raise

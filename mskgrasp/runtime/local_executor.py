@@ -6,7 +6,7 @@ import multiprocessing
 import signal
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -138,6 +138,22 @@ def _end(workers: Sequence[_Worker]) -> None:
         worker.connection.close()
 
 
+class _ParentGone(Exception):
+    """The other end of the connection is closed."""
+
+
+def _talk(call: Callable[..., Any], *message: Any) -> Any:
+    """Receive from the parent, or send to it: a job's own error of these types says nothing of the parent.
+
+    Raises:
+        _ParentGone: It has closed the connection.
+    """
+    try:
+        return call(*message)
+    except (EOFError, BrokenPipeError) as error:
+        raise _ParentGone from error
+
+
 def _serve(
     connection: Connection,
     context: WorkerContext[Any, Any, Any],
@@ -152,10 +168,10 @@ def _serve(
         use_one_core()
         with context(settings) as do:
             while True:
-                for result in do(connection.recv()):
-                    connection.send(("result", result))
-                connection.send(("done", None))
-    except (EOFError, BrokenPipeError):
+                for result in do(_talk(connection.recv)):
+                    _talk(connection.send, ("result", result))
+                _talk(connection.send, ("done", None))
+    except _ParentGone:
         pass
     except lost_by as error:
         connection.send(("lost", str(error)))

@@ -71,7 +71,7 @@ def plan_answer(planner: Planner, request: PlanRequest, frame: RgbdFrame) -> dic
 
 
 def _next_best(planner: Planner, plan: GraspPlan, n: int) -> np.ndarray:
-    """The n grasps (n, 4) of the shortlist that would be chosen after the planned one."""
+    """The n grasps (n, 4), or fewer, of the shortlist that would be chosen after the planned one."""
     grasps, found = plan.candidates.as_vector()[plan.shortlist], plan.qualities[plan.shortlist]
     good = np.flatnonzero(
         (found >= planner.config.least_quality) & (grasps != plan.grasp.as_vector()).any(axis=-1)

@@ -28,7 +28,7 @@ MAX_GRASPS = 4096
 _MOST_VALUES = 8 * MAX_GRASPS
 """Most commas or brackets in JSON: some more than the largest request has."""
 MAX_ALTERNATIVES = 100
-"""Most alternatives of a plan."""
+"""Most alternatives that a request may ask for."""
 REACH = 3.0
 """Greatest distance of a camera or a grasp from the base along an axis, metres."""
 UNIT = 1e-3
@@ -68,8 +68,13 @@ class PlanRequest(FrameRequest):
 
     seed: int = Field(default=0, ge=0, le=2**63 - 1)
     """Determines the candidates."""
-    alternatives: int = Field(default=10, ge=0, le=MAX_ALTERNATIVES)
-    """Number of other grasps to list."""
+    alternatives: int = Field(
+        default=10,
+        ge=0,
+        le=MAX_ALTERNATIVES,
+        description="Greatest number of grasps to list, never more than n_shortlist - 1 of the answer",
+    )
+    """Greatest number of other grasps to list."""
 
 
 class ScoreRequest(FrameRequest):

@@ -187,9 +187,17 @@ def _read(config: TrainConfig, data: Path) -> Samples:
         samples = read_samples(data, config.network, advance=partial(advance_to, bar))
     kept = samples.of_parts_between(*config.success_range)
     if len(kept.parts) < 2 <= len(samples.parts):
+        usable = {samples.parts[number] for number in samples.part.unique().tolist()}
+        if len(usable) < 2:
+            others = [name for name in samples.parts if name not in usable]
+            some = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
+            raise BadDataset(
+                f"only {kept.parts[0]} has usable attempts, and validation needs another part; no attempt at "
+                f"{some} is usable ({', '.join(samples.skipped)}): collect more parts"
+            )
         low, high = config.success_range
         raise BadDataset(
-            f"of the {len(samples.parts)} parts only {kept.parts[0]} has a success in {low:g}..{high:g}, and "
+            f"of the {len(usable)} parts only {kept.parts[0]} has a success in {low:g}..{high:g}, and "
             "validation needs another; widen success_range"
         )
     return kept

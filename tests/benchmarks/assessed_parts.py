@@ -185,9 +185,10 @@ def _figures(trials: Trials) -> tuple[str, ...]:
 
     def rmse(which: int, scale: float) -> str:
         values = [one[which] for one in compared]
-        low, high = rms_interval(values)
         total = np.sqrt((np.concatenate(values) ** 2).mean()) if values else np.nan
-        return f"{scale * total:.2f} [{scale * low:.2f}, {scale * high:.2f}]"
+        interval = rms_interval(values)
+        ends = f" [{scale * interval[0]:.2f}, {scale * interval[1]:.2f}]" if interval else ""
+        return f"{scale * total:.2f}{ends}"
 
     def placed(most: float) -> list[list[bool]]:
         return [

@@ -182,22 +182,33 @@ def test_the_mean_of_few_objects_is_in_its_interval_nearly_as_often_as_stated():
 def test_the_interval_of_an_rms_is_over_clusters_and_wide_where_they_differ():
     alike = [np.array([1.0, 2.0])] * 8
     assert metrics.rms_interval(alike) == pytest.approx((np.sqrt(2.5),) * 2)
-    low, high = metrics.rms_interval([*alike, np.array([9.0, 9.0])])
+    low, high = interval([*alike, np.array([9.0, 9.0])])
     assert low < 2.0 and high > 9.0
-    assert np.isnan(metrics.rms_interval([np.array([1.0])])).all()
-    assert metrics.rms_interval([np.zeros(2), np.zeros(3)]) == (0.0, 0.0)
+    assert metrics.rms_interval([np.zeros(2), np.zeros(3), np.zeros(2)]) == (0.0, 0.0)
     # All that is known is in one cluster: no lower bound but zero.
-    assert metrics.rms_interval([np.zeros(2), np.array([3.0, 3.0])])[0] == 0.0
+    assert interval([np.zeros(2), np.zeros(2), np.array([3.0, 3.0])])[0] == 0.0
+
+
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_fewer_than_three_clusters_have_no_interval_of_an_rms(k):
+    assert metrics.rms_interval([np.array([1e-3]), np.array([0.04])][:k]) is None
+
+
+def interval(clusters: list[np.ndarray]) -> tuple[float, float]:
+    found = metrics.rms_interval(clusters)
+    assert found is not None
+    return found
 
 
 def test_the_interval_of_an_rms_of_alike_clusters_covers_it_about_as_often_as_stated():
     drawn = np.random.default_rng(0).normal(size=(400, 12, 3))
-    found = [metrics.rms_interval(list(one)) for one in drawn]
+    found = [interval(list(one)) for one in drawn]
     assert 0.92 < np.mean([low <= 1.0 <= high for low, high in found]) < 0.98
-    # Two clusters, by hand: t of one degree of freedom, and half the logarithm of 9, twice over two.
-    low, high = metrics.rms_interval([np.array([1.0]), np.array([3.0])])
-    reach = 12.7062 * np.log(3) / 2
-    assert np.log([low, high]) == pytest.approx(np.log(5) / 2 + np.array([-reach, reach]), rel=1e-4)
+    # Three clusters, by hand: t of two degrees of freedom; logarithms of the mean squares without each.
+    low, high = interval([np.array([1.0]), np.array([3.0]), np.array([1.0])])
+    logs = np.log([5.0, 1.0, 5.0]) / 2
+    reach = 4.30265 * np.sqrt(2 / 3 * ((logs - logs.mean()) ** 2).sum())
+    assert np.log([low, high]) == pytest.approx(np.log(11 / 3) / 2 + np.array([-reach, reach]), rel=1e-4)
 
 
 def test_the_expected_calibration_error_is_the_mean_gap_of_the_bins():

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -141,6 +142,30 @@ def test_a_column_of_another_type_or_length_is_named(data):
     assert "tilt is float64, must be float32" in only(data)
     replace(shard(data), "tilt", np.zeros(2, np.float32))
     assert "tilt has shape (2,)" in only(data)
+
+
+@pytest.mark.parametrize(
+    ("column", "array", "words"),
+    [
+        ("grasp", np.float32(0.5), r"grasp has shape \(\), must be \(3, 4\)"),
+        ("success", np.array([b"yes", b"no", b"no"], object), "success is object, must be bool"),
+        ("success", np.bool_(True), r"success has shape \(\), must be \(3, \)"),
+    ],
+    ids=["scalar grasp", "success as text", "scalar success"],
+)
+def test_a_column_that_is_no_list_of_its_type_is_named(data, column, array, words):
+    replace(shard(data), column, array)
+    assert re.search(words, only(data))
+    with pytest.raises(BadDataset, match=words):
+        read_shard(shard(data))
+
+
+def test_a_success_with_a_failure_that_has_no_name_is_named(data):
+    path, row = held(data)
+    put(path, "failure", row, 200)
+    assert only(data, path.name) == f"failure 200 of attempt {row}, legal 0..{len(FAILURES) - 1}; "
+    with pytest.raises(BadDataset, match="failure 200"):
+        read_shard(path)
 
 
 def test_labels_that_contradict_each_other_are_named(data):
@@ -324,6 +349,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
         ("intrinsics", [[366.0, 0, 79.5], [0, 366.0, 79.5], [0, 0, 1]]),
         ("physics", '{"rate_hz": 250}'),
         ("fidelity", "gpu"),
+        ("hand", '{"pad_width": 0.02}'),
         ("noise", '{"finger_force": [5.0, 70.0]}'),
         ("family", "spoon"),
     ],

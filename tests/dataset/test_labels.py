@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import resource
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.errors import BadDataset, UsageError
-from mskgrasp.dataset import list_shards, read_shard
+from mskgrasp.dataset import list_shards, read_shard, write_shard
 from mskgrasp.dataset.attempts import COLUMNS
 from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.labels import export_labels, read_labels
@@ -54,6 +55,32 @@ def test_labels_are_those_of_the_shards_to_a_micrometre(folder: Path, tmp_path: 
             assert ours.dtype == theirs.dtype and ours.shape == theirs.shape
             assert ours[rows] == pytest.approx(theirs[rows], abs=3e-6, nan_ok=True), name
         assert np.isnan(labels.columns["displacement"][~held]).all()
+
+
+def test_an_unknown_force_or_friction_stays_unknown(folder: Path, tmp_path: Path):
+    path = list_shards(folder)[0]
+    attempts, info = read_shard(path)
+    some = np.arange(len(attempts)) % 2 == 0
+    changes = {
+        name: np.where(some, np.nan, getattr(attempts, name)).astype(np.float32)
+        for name in ("finger_force", "friction_pad_part")
+    }
+    write_shard(path, replace(attempts, **changes), info)
+    export_labels(folder, tmp_path / "boxes.labels")
+    found = read_labels([tmp_path / "boxes.labels"])[info.part, info.index].columns
+    for name, values in changes.items():
+        assert found[name] == pytest.approx(values, abs=1e-4, nan_ok=True), name
+
+
+@pytest.mark.parametrize("changes", [{"fidelity": "gpu"}, {"hand": {"pad_width": 0.02}}], ids=str)
+def test_shards_of_another_fidelity_or_hand_are_not_exported_with_the_others(
+    folder: Path, tmp_path: Path, changes: dict
+):
+    path = list_shards(folder)[1]
+    attempts, info = read_shard(path)
+    write_shard(path, attempts, replace(info, **changes))
+    with pytest.raises(BadDataset, match=f"{next(iter(changes))} differs from the other shards'"):
+        export_labels(folder, tmp_path / "boxes.labels")
 
 
 def test_labels_are_a_small_part_of_the_dataset(tmp_path: Path):

@@ -26,14 +26,18 @@ def test_success_and_errors_follow_their_definitions():
 
 
 def test_intervals_are_over_parts_not_over_grasps():
-    """Two parts, one with twice the error: a hundred grasps tell no more than two would."""
+    """Three parts, one with twice the error: a hundred and fifty grasps tell no more than three would."""
     far = [trial(part="b", number=k, measured=[-0.003, 0.008, 0.0, 0.1]) for k in range(50)]
-    near = [trial(number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)]
-    interval = summarise_trials(far + near).overall.translation_interval
-    # The logarithms of both parts lie ln 2 apart; Student's t of one degree of freedom, 12.706.
-    factor = np.exp(12.706 * np.log(2) / 2)
-    rmse = np.sqrt((0.005**2 + 0.010**2) / 2)
+    near, alike = (
+        [trial(part=part, number=k, measured=[0.0, 0.004, 0.0, 0.1]) for k in range(50)] for part in "cd"
+    )
+    interval = summarise_trials(far + near + alike).overall.translation_interval
+    # Mean squares without one part, square millimetres; Student's t of two degrees of freedom, 4.3027.
+    logs = np.log([25.0, 62.5, 62.5]) / 2
+    factor = np.exp(4.3027 * np.sqrt(2 / 3 * ((logs - logs.mean()) ** 2).sum()))
+    rmse = np.sqrt((2 * 0.005**2 + 0.010**2) / 3)
     assert interval == pytest.approx((rmse / factor, rmse * factor), rel=1e-3)
+    assert summarise_trials(far + near).overall.translation_interval is None
 
 
 def test_the_interval_of_the_success_rate_is_over_parts_too():

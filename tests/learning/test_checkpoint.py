@@ -38,6 +38,7 @@ def checkpoint_of(network, optimiser, epoch: int = 3) -> Checkpoint:
     return Checkpoint(
         fingerprint="abc",
         samples_version=7,
+        sides="def",
         stage="gqn",
         epoch=epoch,
         history=[epoch_metrics(epoch)],
@@ -53,6 +54,7 @@ def test_a_restored_optimiser_takes_the_same_next_step(tmp_path):
     write_checkpoint(path, checkpoint_of(network, optimiser))
     saved = read_checkpoint(path)
     assert (saved.fingerprint, saved.samples_version, saved.stage, saved.epoch) == ("abc", 7, "gqn", 3)
+    assert saved.sides == "def"
     assert saved.history == [epoch_metrics(3)]
     other, fresh = stepped(seed=1, steps=0)
     restore_checkpoint(saved, {"gqn": other}, fresh)

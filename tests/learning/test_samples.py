@@ -10,7 +10,7 @@ from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.learning.samples import part_sides, read_samples
 from mskgrasp.parts import build_part
 from mskgrasp.parts.catalogue import Index, entry_of, make_index, split_of, write_index
-from mskgrasp.parts.recipes import cad
+from mskgrasp.parts.recipes import cad, families
 from tests import synthetic
 from tests.learning.small import HAND, PATCH
 
@@ -116,6 +116,44 @@ def test_parts_that_were_not_built_here_are_on_the_side_of_their_family(monkeypa
         assert {name for name in drawn if sides[name] == side} == {
             n for n, one in drawn.items() if one == side
         }
+
+
+@pytest.fixture(scope="module")
+def named(tmp_path_factory):
+    """Names of parts by their side of the catalogue, of which one part is built."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("catalogue")))
+        write_index(make_index([entry_of(build_part("washer_m36").name)], {}, Index(parts={}, left_out={})))
+        names: dict[str, list[str]] = {}
+        for recipe in families.recipes().values():
+            names.setdefault(split_of(recipe.family, recipe.name), []).append(recipe.name)
+        yield names
+
+
+@pytest.mark.parametrize(
+    ("numbers", "missing"),
+    [
+        ({"train": 1, "test": 3}, "validation"),
+        ({"test": 3}, "validation"),
+        ({"new_sizes": 1, "test": 2}, "train"),
+        ({"validation": 1, "test": 3}, "train"),
+        ({"validation": 3}, "train"),
+    ],
+    ids=str,
+)
+def test_a_side_without_parts_takes_none_of_the_held_out_families(named, numbers, missing):
+    parts = tuple(name for side, n in numbers.items() for name in named[side][:n])
+    with pytest.raises(BadDataset, match=f"no part is left for {missing} .*--parts {missing}, too"):
+        part_sides(parts, 0.2, "catalogue")
+
+
+@pytest.mark.parametrize("numbers", [{"train": 2}, {"train": 1, "new_sizes": 1}, {"new_sizes": 2}], ids=str)
+def test_a_side_without_parts_takes_one_that_may_be_trained_on(named, numbers):
+    held_out = {name: "test" for name in named["test"][:5]}
+    others = tuple(name for side, n in numbers.items() for name in named[side][:n])
+    sides = part_sides((*held_out, *others), 0.2, "catalogue")
+    assert held_out.items() <= sides.items()
+    assert {sides[name] for name in others} == {"train", "validation"}
 
 
 def test_the_quality_network_sees_every_second_pixel_of_the_middle_columns(dataset):

@@ -177,10 +177,25 @@ def contents(path):
         return {key: file.get_tensor(key) for key in file.keys()}, file.metadata()
 
 
+def test_all_stages_share_one_copy_of_the_samples_on_the_device(samples, tmp_path, monkeypatch):
+    copied, on = [], Samples.on
+    monkeypatch.setattr(Samples, "on", lambda self, device: copied.append(str(device)) or on(self, device))
+    stage = SHORT.gqn.model_copy(update={"epochs": 1})
+    learn(samples, SHORT.model_copy(update={"gqn": stage, "gdn": stage}), checkpoint_path=tmp_path / "c")
+    assert copied == ["cpu"]
+
+
 def test_a_checkpoint_of_other_data_is_refused(samples, stopped):
     other = dataclasses.replace(samples, fingerprint="0")
     with pytest.raises(UsageError, match="other data"):
         learn(other, SHORT, checkpoint_path=stopped)
+
+
+def test_a_checkpoint_of_another_split_is_refused(samples, stopped):
+    sides = split(samples, SHORT)
+    swapped = dataclasses.replace(sides, training=sides.validation, validation=sides.training)
+    with pytest.raises(UsageError, match="other parts to train on or to validate on"):
+        learn(samples, SHORT, checkpoint_path=stopped, sides=swapped)
 
 
 def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, stopped):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import io
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,35 @@ def test_the_exit_code_is_that_of_the_program():
         with pytest.raises(SystemExit) as ended:
             run("program", lambda given=given: given)
         assert ended.value.code == code
+
+
+def _ended(main: str) -> tuple[int, str]:
+    """Exit code and errors of a program whose standard output nobody reads."""
+    code = f"from mskgrasp.runtime.cli import run\nrun('program', lambda: {main})"
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code], stdout=writer, stderr=subprocess.PIPE, text=True, timeout=120
+        )
+    finally:
+        os.close(writer)
+    return done.returncode, done.stderr
+
+
+def test_a_program_whose_output_nobody_reads_fails_as_one_that_sigpipe_ends():
+    assert _ended("print('1 bad file') or 1") == (141, "")
+
+
+def test_a_pipe_that_breaks_elsewhere_is_a_defect(monkeypatch):
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO(), encoding="utf-8"))
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        with pytest.raises(BrokenPipeError):
+            run("program", lambda: os.write(writer, b"x"))
+    finally:
+        os.close(writer)
 
 
 def test_what_is_printed_shows_at_once_and_may_hold_any_name(monkeypatch):

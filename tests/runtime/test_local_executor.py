@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mskgrasp.runtime.executor import WorkerFailed
 from mskgrasp.runtime.local_executor import LocalExecutor
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, Work, results, run_jobs
 from tests.runtime.test_worker_pool import bench
@@ -71,6 +72,30 @@ def test_workers_put_away_what_they_use(tmp_path: Path):
         next(found)
         assert len(list(tmp_path.iterdir())) == 2
     assert not list(tmp_path.iterdir())  # although they were at work
+
+
+@contextmanager
+def breaking(folder: Path) -> Iterator[Callable[[str], Iterator[str]]]:
+    """Meets files and pipes of its own that end early."""
+
+    def work(job: str) -> Iterator[str]:
+        if job == "file":
+            raise EOFError("the file ends early")
+        reader, writer = os.pipe()
+        os.close(reader)
+        os.write(writer, b"x")
+        yield job
+
+    yield work
+
+
+@pytest.mark.parametrize(
+    ("job", "cause"), [("file", "EOFError: the file ends early"), ("pipe", "Broken pipe")]
+)
+def test_a_pipe_or_file_of_the_job_that_ends_is_no_lost_parent(tmp_path: Path, job: str, cause: str):
+    executor = LocalExecutor(breaking, tmp_path, 1)
+    with closing(executor), pytest.raises(WorkerFailed, match=cause):
+        list(run_jobs([job], executor))
 
 
 def test_closing_the_iterator_ends_the_workers():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.grasp import lowest_grasp_z
-from mskgrasp.planning.planner import Planner
+from mskgrasp.planning.planner import PROMISING, Planner
 from mskgrasp.serve.answers import place_answer, respond
-from mskgrasp.serve.requests import PlaceRequest
+from mskgrasp.serve.requests import MAX_ALTERNATIVES, PlaceRequest, PlanRequest, body_schema
 from tests import synthetic
 from tests.planning.workspaces import WORKSPACE
 from tests.serve.bodies import ALONG, FRAME, JSON, NPZ, npz, text
@@ -30,6 +30,13 @@ def test_a_plan_is_that_of_the_planner_with_alternatives_in_its_order(planner: P
     scores = [one["score"] for one in found["alternatives"]]
     assert len(scores) == 4 and scores == sorted(scores) and scores[0] >= found["score"]
     assert all(one["quality"] >= 0.5 and one["grasp"] != found["grasp"] for one in found["alternatives"])
+
+
+def test_no_more_alternatives_are_listed_than_the_last_selection_has_and_the_schema_says_so(planner: Planner):
+    _, found = answer(planner, "plan", npz(alternatives=MAX_ALTERNATIVES))
+    assert 4 < len(found["alternatives"]) <= found["n_shortlist"] - 1 == PROMISING - 1 < MAX_ALTERNATIVES
+    schema = body_schema(PlanRequest)["requestBody"]["content"][JSON]["schema"]
+    assert "never more than n_shortlist - 1" in schema["properties"]["alternatives"]["description"]
 
 
 def test_a_pose_of_the_hand_belongs_to_the_grasp(planner: Planner):

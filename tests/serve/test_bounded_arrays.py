@@ -53,6 +53,24 @@ def test_an_image_comes_back_as_it_was_written_and_its_text_is_skipped():
     np.testing.assert_array_equal(read_png16(png(20, 16, rows, more=(bomb,))), pixels)
 
 
+def npy(shape: str, data: bytes = b"") -> bytes:
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}\n".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + data
+
+
+@pytest.mark.parametrize("shape", ["(300000000, 0)", "(0, 4)", "(0,)", "(-1, 4)"])
+def test_an_array_with_a_side_of_nothing_is_refused(shape: str):
+    with pytest.raises(Rejected, match="each 1 or more") as refused:
+        read_npz(packed(npy(shape)), LIMITS)
+    assert refused.value.status == 400
+
+
+def test_a_side_that_is_a_truth_value_is_refused():
+    with pytest.raises(Rejected, match=r"shape \(True,\)") as refused:
+        read_npz(packed(npy("(True,)", bytes(8))), LIMITS)
+    assert refused.value.status == 400
+
+
 def lying(body: bytes, size: int) -> bytes:
     """The archive, with another unpacked size in both of its headers."""
     at = body.index(b"PK\x01\x02")

@@ -1,4 +1,5 @@
 import csv
+import dataclasses
 import json
 
 import numpy as np
@@ -8,6 +9,7 @@ import torch
 from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
+from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import list_shards, read_shard, shard_path, write_shard
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
@@ -137,6 +139,22 @@ def test_a_success_range_that_leaves_one_part_names_it(dataset, tmp_path):
         BadDataset, match=f"of the 8 parts only {best} has a success in .*; widen success_range"
     ):
         train.run_training(config)
+
+
+def test_a_part_without_a_usable_attempt_is_named_and_the_success_range_is_not_blamed(tmp_path):
+    data = synthetic.write_dataset(tmp_path / "data", n_parts=2, n_attempts=20, seed=1)
+    path = shard_path(data, "box_1", 0)
+    attempts, info = read_shard(path)
+    nobody = dataclasses.replace(
+        attempts,
+        success=np.zeros_like(attempts.success),
+        failure=np.full_like(attempts.failure, FAILURES.index("unsettled")),
+        displacement=np.full_like(attempts.displacement, np.nan),
+    )
+    write_shard(path, nobody, info)
+    words = r"only box_0 has usable attempts, .* box_1 is usable \(the part was not at rest\): collect more"
+    with pytest.raises(BadDataset, match=words):
+        train.run_training(program(SHORT, data=data, out=tmp_path / "model"))
 
 
 def test_a_folder_of_another_programs_run_is_refused_by_that_name(dataset, tmp_path):
