@@ -24,8 +24,9 @@ class CalibrateConfig(Config):
 
     cell: Path | None = None
     """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
-    out: Path = Path("out/calibration")
-    """Folder for the calibration and the pictures; one calibration, one folder."""
+    out: Path | None = None
+    """Folder for the calibration and the pictures; one calibration, one folder. By default that of --from,
+    without it out/calibration."""
     source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
     """Solve again from the pictures in this folder; no arm and no camera is needed."""
     print_board: Path | None = None
@@ -72,6 +73,11 @@ class CalibrateConfig(Config):
                 f"of a camera at {list(self.camera_at)}, at least {least:.0f} are needed to see the table"
             )
         return self
+
+    @property
+    def folder(self) -> Path:
+        """``out``, or what it is by default."""
+        return self.out or self.source or Path("out/calibration")
 
     def T_base_camera(self) -> Pose:
         """Pose of the camera measured by hand.

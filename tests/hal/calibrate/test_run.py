@@ -27,7 +27,7 @@ from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import pose_distance
 from tests.hal.calibrate.toy_bench import BOARD as TOY_BOARD
 from tests.hal.calibrate.toy_bench import HELD, bench
-from tests.programs import running
+from tests.programs import run_here, running
 
 SAPIEN = Path(__file__).parents[3] / "configs" / "cells" / "sapien.yaml"
 BOARD = Board()
@@ -81,6 +81,24 @@ def test_the_pictures_can_be_solved_again_into_a_file_that_can_be_read(folder: P
     assert calibration.n_poses >= 15 and not calibration.by_hand
     assert (tmp_path / "corners.png").stat().st_size > 10_000
     assert (tmp_path / "residuals.png").stat().st_size > 10_000
+
+
+def test_pictures_solved_again_replace_the_calibration_in_their_own_folder_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.chdir(tmp_path)
+    other = tmp_path / "out" / "calibration" / "calibration.yaml"
+    other.parent.mkdir(parents=True)
+    other.write_text("another camera")
+    (tmp_path / "mine").mkdir()
+    for index, picture in enumerate(taken("laser")):
+        write_picture(tmp_path / "mine" / f"pose-{index:03d}.npz", picture)
+    done = run_here(run.main, "--from", "mine")
+    assert done.returncode == 0 and "residuals.png in mine;" in done.stdout, done.stderr
+    assert (tmp_path / "mine" / "calibration.yaml").is_file() and other.read_text() == "another camera"
+    assert run_here(run.main, "--from", "mine", "--out", "again").returncode == 0
+    assert (tmp_path / "again" / "calibration.yaml").is_file()
+    assert run_here(run.main, "--from", "nowhere").returncode == 2 and not Path("nowhere").exists()
 
 
 def test_the_board_of_stored_pictures_is_theirs_but_for_what_options_state(tmp_path: Path, capsys):
