@@ -240,16 +240,25 @@ def _take_board(cell: Cell, config: CalibrateConfig, operator: Operator) -> None
 
 
 def _stored_board(path: Path, given: Board) -> Board:
-    """The board that pictures were taken of; what options state takes precedence.
+    """The board that pictures were taken of; an option takes precedence unless it states the default.
+
+    Whether an option that states the default was given is not known; a line says what is used instead.
 
     Raises:
         BadConfig: The file is not valid, or not with these options.
     """
     stored, usual = read_config(Board, path).model_dump(), Board().model_dump()
     changed = {key: value for key, value in given.model_dump().items() if value != usual[key]}
-    if any(stored[key] != value for key, value in changed.items()):
-        note(f"board: {', '.join(f'{key} {value}' for key, value in changed.items())}, else as in {path}")
+    kept = {key: value for key, value in stored.items() if key not in changed and value != usual[key]}
+    if kept or any(stored[key] != value for key, value in changed.items()):
+        here = f"{_listed(changed)}, else " if changed else ""
+        there = f" ({_listed(kept)}; to use a default instead, change that file)" if kept else ""
+        note(f"board: {here}as in {path}{there}")
     return check_config(Board, stored | changed, f"{path} with --board")
+
+
+def _listed(values: dict[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in values.items())
 
 
 def _now() -> str:
