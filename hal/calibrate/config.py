@@ -35,8 +35,9 @@ class CalibrateConfig(Config):
     """The board, as it was printed and measured."""
     poses: int = Field(default=24, ge=MIN_VIEWS, le=200)
     """Pictures of the board to take."""
-    tilt_deg: float = Field(default=30.0, ge=10, le=50)
-    """Greatest tilt of the board against the camera's line of sight, degrees."""
+    tilt_deg: float = Field(default=30.0, ge=25, le=50)
+    """Greatest tilt of the board against the camera's line of sight, degrees; with less than 25, 8 pictures
+    may not determine the camera."""
     board_at: tuple[float, float, float] = (0.16, 0.0, 0.0)
     """Middle of the board in the tcp frame, m, to 1 cm: x across the thin side of the hand, z out of it."""
     board_turn_deg: float = Field(default=0.0, ge=-180, le=180)
