@@ -67,8 +67,8 @@ class HandEye:
         rms_px: (n,) RMS distance of corners found and expected, pixels.
         translation_m: (n,) distance of the board as seen and as held, metres.
         rotation_rad: (n,) angle between both, radians.
-        half_translation_m: Distance of a point on the table by two calibrations from half the views each,
-            metres: about the effect of another set of poses.
+        half_translation_m: Distance of the board's mean position by two calibrations from half the views
+            each, metres: about the effect of another set of poses.
         half_rotation_rad: The angle between the two calibrations, radians.
         scale: Size of the board's squares that fits best, as a fraction of the configured size.
     """
