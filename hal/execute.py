@@ -205,7 +205,7 @@ def let_go(cell: Cell, place: Grasp, *, opening: float | None = None, tallest: f
     state = cell.arm.state()
     now = state.gripper_width
     width = now + RELEASE if opening is None else max(opening, now + LEAST_RELEASE)
-    if width < state.max_width:
+    if width < min(stroke, state.max_width):
         cell.arm.move_gripper(width)
     else:
         cell.arm.open_gripper()

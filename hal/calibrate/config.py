@@ -24,8 +24,9 @@ class CalibrateConfig(Config):
 
     cell: Path | None = None
     """YAML file of the cell, for example configs/cells/panda_kinect2.yaml."""
-    out: Path = Path("out/calibration")
-    """Folder for the calibration and the pictures; one calibration, one folder."""
+    out: Path | None = None
+    """Folder for the calibration and the pictures; one calibration, one folder. By default that of --from,
+    without it out/calibration."""
     source: Annotated[Path | None, tyro.conf.arg(name="from")] = None
     """Solve again from the pictures in this folder; no arm and no camera is needed."""
     print_board: Path | None = None
@@ -34,8 +35,9 @@ class CalibrateConfig(Config):
     """The board, as it was printed and measured."""
     poses: int = Field(default=24, ge=MIN_VIEWS, le=200)
     """Pictures of the board to take."""
-    tilt_deg: float = Field(default=30.0, ge=10, le=50)
-    """Greatest tilt of the board against the camera's line of sight, degrees."""
+    tilt_deg: float = Field(default=30.0, ge=25, le=50)
+    """Greatest tilt of the board against the camera's line of sight, degrees; with less than 25, 8 pictures
+    may not determine the camera."""
     board_at: tuple[float, float, float] = (0.16, 0.0, 0.0)
     """Middle of the board in the tcp frame, m, to 1 cm: x across the thin side of the hand, z out of it."""
     board_turn_deg: float = Field(default=0.0, ge=-180, le=180)
@@ -72,6 +74,11 @@ class CalibrateConfig(Config):
                 f"of a camera at {list(self.camera_at)}, at least {least:.0f} are needed to see the table"
             )
         return self
+
+    @property
+    def folder(self) -> Path:
+        """``out``, or what it is by default."""
+        return self.out or self.source or Path("out/calibration")
 
     def T_base_camera(self) -> Pose:
         """Pose of the camera measured by hand.

@@ -26,6 +26,13 @@ MAX_RMS_PX = 1.5
 """Greatest reprojection error of one camera and one rigidly held board."""
 MAX_SCALE_ERROR = 0.015
 """Greatest relative error of the size of the squares; more means another board."""
+MAX_HALF_M = 0.005
+"""Greatest distance of the board by two calibrations from half the views each, metres; usual are 0.5 mm."""
+_SLIPPED = (
+    "the board slipped or was loose: fix it so that it cannot move in the hand, and take the pictures again"
+)
+_COMPARABLE = 12
+"""Least number of views whose halves must agree if none was rejected; less than 6 views determine little."""
 _OUTLIER_PX = 3.0
 _LOSS_PX = 0.5
 
@@ -60,8 +67,8 @@ class HandEye:
         rms_px: (n,) RMS distance of corners found and expected, pixels.
         translation_m: (n,) distance of the board as seen and as held, metres.
         rotation_rad: (n,) angle between both, radians.
-        half_translation_m: Distance of a point on the table by two calibrations from half the views each,
-            metres: about the effect of another set of poses.
+        half_translation_m: Distance of the board's mean position by two calibrations from half the views
+            each, metres: about the effect of another set of poses.
         half_rotation_rad: The angle between the two calibrations, radians.
         scale: Size of the board's squares that fits best, as a fraction of the configured size.
     """
@@ -92,7 +99,7 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
 
     Raises:
         BadCalibrationSet: Too few views with the board, too little tilt, a board too small in the image,
-            or views that contradict each other.
+            views that contradict each other, or halves of them that do.
     """
     seen = [board_pose(board, view.corners, view.intrinsics) for view in views]
     usable = [i for i, pose in enumerate(seen) if pose is not None]
@@ -114,6 +121,7 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
         used = used[good]
         if len(used) < MIN_VIEWS:
             raise BadCalibrationSet(_contradiction(rms))
+        _refuse_flat([views[i].T_base_tcp for i in used], n_rejected=int((~good).sum()))
         fit = _fit(board, [views[i] for i in used], *fit)
         rms = _rms_px(board, [views[i] for i in used], *fit)
     chosen = [views[i] for i in used]
@@ -131,6 +139,14 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
     halves = [_fit(board, chosen[k::2], *fit)[0] for k in (0, 1)]
     looked_at = np.mean([(view.T_base_tcp @ T_tcp_board).position for view in chosen], axis=0)
     apart = [half.apply(T_base_camera.inverse().apply(looked_at)) for half in halves]
+    half_translation_m = float(np.linalg.norm(apart[0] - apart[1]))
+    comparable = len(used) >= _COMPARABLE or len(used) < len(usable)
+    if comparable and half_translation_m > MAX_HALF_M:
+        raise BadCalibrationSet(
+            "the calibration does not repeat: two halves of the pictures place the board "
+            f"{half_translation_m * 1e3:.1f} mm apart, at most {MAX_HALF_M * 1e3:g} mm are allowed; "
+            f"{_SLIPPED}"
+        )
     return HandEye(
         T_base_camera=T_base_camera,
         T_tcp_board=T_tcp_board,
@@ -138,7 +154,7 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
         rms_px=rms,
         translation_m=translation,
         rotation_rad=rotation,
-        half_translation_m=float(np.linalg.norm(apart[0] - apart[1])),
+        half_translation_m=half_translation_m,
         half_rotation_rad=pose_distance(halves[0], halves[1])[1],
         scale=scale,
     )
@@ -154,13 +170,16 @@ def spread(poses: Sequence[Pose]) -> np.ndarray:
 # ---------------------------------------------------------------------- refusals
 
 
-def _refuse_flat(hands: Sequence[Pose]) -> None:
+def _refuse_flat(hands: Sequence[Pose], *, n_rejected: int = 0) -> None:
     second = float(spread(hands)[1])
     if second < MIN_SPREAD_RAD:
+        where, remedy = "", "tilt the board in different directions (--tilt-deg) and by more"
+        if n_rejected:
+            where = f" in the {len(hands)} pictures that agree ({n_rejected} contradict them)"
+            remedy = _SLIPPED
         raise BadCalibrationSet(
-            f"the hand turned by {np.degrees(second):.1f} degrees (RMS) about its second axis, at least "
-            f"{np.degrees(MIN_SPREAD_RAD):.0f} are needed; tilt the board in different directions "
-            "(--tilt-deg) and by more"
+            f"the hand turned by {np.degrees(second):.1f} degrees (RMS) about its second axis{where}, at "
+            f"least {np.degrees(MIN_SPREAD_RAD):.0f} are needed; {remedy}"
         )
 
 

@@ -46,7 +46,7 @@ DESCRIPTION = """Estimates the pose of the camera over the table with a ChArUco 
 Print the board with --print-board board.pdf. The arm closes its fingers on the board, shows it to the camera
 from many sides, and brings it back; keep a hand on the emergency stop. Ctrl-C stops the arm, and the pictures
 taken so far can be solved with --from FOLDER. Writes calibration.yaml, corners.png, residuals.png and the
-pictures. See docs/calibration.md.
+pictures into --out: by default the folder of --from, without that out/calibration. See docs/calibration.md.
 
 python -m hal.calibrate --print-board board.pdf
 
@@ -59,7 +59,7 @@ _PLATE = 0.02
 
 
 def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
-    """Take the pictures into ``config.out``.
+    """Take the pictures into ``config.folder``.
 
     Returns:
         The cell's workspace.
@@ -69,10 +69,10 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
         HalError: Arm or camera failed, or the board was not seen.
         StoppedByOperator: The operator ended the program.
     """
-    if picture_paths(config.out):
+    if picture_paths(config.folder):
         raise UsageError(
-            f"{config.out} holds the pictures of an earlier run; solve them with --from {config.out}, or "
-            "choose another --out"
+            f"{config.folder} holds the pictures of an earlier run; solve them with --from {config.folder}, "
+            "or choose another --out"
         )
     values = read_yaml(cell_file)
     cell = cell_from_values(_with_camera_at(values, config, cell_file), cell_file)
@@ -84,14 +84,14 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
     if cell.arm.simulated and cell.board_holder is None:
         raise UsageError(f"{cell_file}: nothing draws a board in this simulated cell; type: sapien does")
     operator = Operator(cell)
-    write_config(config.board, config.out / "board.yaml")
+    write_config(config.board, config.folder / "board.yaml")
 
     def keep(index: int, picture: Picture, n_corners: int) -> None:
-        write_picture(config.out / f"pose-{index:03d}.npz", picture)
+        write_picture(config.folder / f"pose-{index:03d}.npz", picture)
         print(f"picture {index:3d}: {n_corners} of {config.board.n_corners} corners", flush=True)
 
     with cell.connected():
-        write_picture(config.out / "table.npz", Picture.of(cell.camera.capture(), cell.arm.state()))
+        write_picture(config.folder / "table.npz", Picture.of(cell.camera.capture(), cell.arm.state()))
         _take_board(cell, config, operator)
         take_pictures(
             cell,
@@ -109,7 +109,8 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
             operator.wait_for("Take hold of the board; Enter: the fingers open, q to stop: ")
         except StoppedByOperator as error:
             raise StoppedByOperator(
-                f"stopped by the operator, the board in the hand; solve the pictures with --from {config.out}"
+                "stopped by the operator, the board in the hand; solve the pictures with --from "
+                f"{config.folder}"
             ) from error
         if operator.asks:
             cell.arm.open_gripper()
@@ -117,7 +118,7 @@ def capture(config: CalibrateConfig, cell_file: Path) -> Workspace:
 
 
 def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Workspace | None) -> list[str]:
-    """Solve from the pictures in a folder, write calibration and pictures into ``config.out``.
+    """Solve from the pictures in a folder, write calibration and pictures into ``config.folder``.
 
     Returns:
         The result, line by line.
@@ -147,7 +148,7 @@ def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Worksp
     try:
         found = solve_hand_eye(board, views)
     except BadCalibrationSet:
-        draw_corners(board, pictures, views, None, config.out / "corners.png")
+        draw_corners(board, pictures, views, None, config.folder / "corners.png")
         refuse_invisible(board, pictures)
         raise
     offset = depth_offset(board, pictures, found)
@@ -160,9 +161,9 @@ def solve(config: CalibrateConfig, folder: Path, board: Board, workspace: Worksp
         n_poses=len(found.used),
         made=_now(),
     )
-    write_calibration(config.out / "calibration.yaml", calibration)
-    draw_corners(board, pictures, views, found, config.out / "corners.png")
-    draw_residuals(views, found, config.out / "residuals.png")
+    write_calibration(config.folder / "calibration.yaml", calibration)
+    draw_corners(board, pictures, views, found, config.folder / "corners.png")
+    draw_residuals(views, found, config.folder / "residuals.png")
     lines = describe(found, views, pictures[0].T_base_camera, offset)
     return lines + _describe_table(folder, found.T_base_camera, offset, workspace)
 
@@ -206,7 +207,7 @@ def _with_camera_at(values: dict[str, Any], config: CalibrateConfig, cell_file: 
         n_poses=0,
         made=_now(),
     )
-    path = config.out.absolute() / "by_hand.yaml"
+    path = config.folder.absolute() / "by_hand.yaml"
     write_calibration(path, by_hand)
     return {**values, "camera": {**values["camera"], "calibration": str(path)}}
 
@@ -239,16 +240,25 @@ def _take_board(cell: Cell, config: CalibrateConfig, operator: Operator) -> None
 
 
 def _stored_board(path: Path, given: Board) -> Board:
-    """The board that pictures were taken of; what options state takes precedence.
+    """The board that pictures were taken of; an option takes precedence unless it states the default.
+
+    Whether an option that states the default was given is not known; a line says what is used instead.
 
     Raises:
         BadConfig: The file is not valid, or not with these options.
     """
     stored, usual = read_config(Board, path).model_dump(), Board().model_dump()
     changed = {key: value for key, value in given.model_dump().items() if value != usual[key]}
-    if any(stored[key] != value for key, value in changed.items()):
-        note(f"board: {', '.join(f'{key} {value}' for key, value in changed.items())}, else as in {path}")
+    kept = {key: value for key, value in stored.items() if key not in changed and value != usual[key]}
+    if kept or any(stored[key] != value for key, value in changed.items()):
+        here = f"{_listed(changed)}, else " if changed else ""
+        there = f" ({_listed(kept)}; to use a default instead, change that file)" if kept else ""
+        note(f"board: {here}as in {path}{there}")
     return check_config(Board, stored | changed, f"{path} with --board")
+
+
+def _listed(values: dict[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in values.items())
 
 
 def _now() -> str:
@@ -258,7 +268,7 @@ def _now() -> str:
 def main() -> int:
     """Take pictures, solve, report."""
     config = parse(CalibrateConfig, prog="python -m hal.calibrate", description=DESCRIPTION)
-    board, folder = config.board, config.out
+    board, folder = config.board, config.folder
     if config.print_board is not None:
         make_folder(config.print_board.parent)
         paper = print_board(board, config.print_board)
@@ -270,7 +280,8 @@ def main() -> int:
         raise UsageError(
             "give --cell FILE (take pictures and solve), --from FOLDER (solve), or --print-board FILE"
         )
-    make_folder(config.out)
+    if config.folder != config.source:
+        make_folder(config.folder)
     if config.source is not None:
         folder = config.source
         if (folder / "board.yaml").is_file():
@@ -281,9 +292,7 @@ def main() -> int:
         workspace = capture(config, config.cell)
     for line in solve(config, folder, board, workspace):
         print(line)
-    print(
-        f"wrote calibration.yaml, corners.png and residuals.png in {config.out}; look at both pictures, then"
-    )
-    print("copy calibration.yaml to where camera.calibration of the cell file points; if the line 'depth'")
-    print("states a correction, add it to camera.depth_offset of the cell file")
+    print(f"wrote calibration.yaml, corners.png and residuals.png in {config.folder}; look at both pictures,")
+    print("then copy calibration.yaml to where camera.calibration of the cell file points; if the line")
+    print("'depth' states a correction, add it to camera.depth_offset of the cell file")
     return 0

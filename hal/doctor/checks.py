@@ -318,7 +318,7 @@ def check_stream(camera: Camera, frames: list[RgbdFrame]) -> Iterator[Finding]:
 
 
 def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
-    """Whether the camera sees the whole region, up to the height of a lift."""
+    """Whether the camera sees the whole region, from the table up to the height of a lift."""
     problem = implausible(frame.T_base_camera, workspace)
     if problem:
         yield Finding(
@@ -326,7 +326,8 @@ def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
         )
         return
     x_min, x_max, y_min, y_max = workspace.region
-    corners = np.array([[x, y, workspace.table_z] for x in (x_min, x_max) for y in (y_min, y_max)])
+    heights = (workspace.table_z, workspace.table_z + workspace.lift_height)
+    corners = np.array([[x, y, z] for x in (x_min, x_max) for y in (y_min, y_max) for z in heights])
     pixels = project(frame.T_base_camera.inverse().apply(corners), frame.intrinsics)
     limit = np.array(frame.depth.shape[::-1]) - 1
     inside = ((pixels >= 0) & (pixels <= limit)).all()
@@ -336,8 +337,8 @@ def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
         subject="camera view",
         text=f"region whole in the image, {margin:.0f} pixels from its edge"
         if inside
-        else f"the region reaches {-margin:.0f} pixels out of the image; move the camera, or make "
-        "workspace.region smaller",
+        else f"the region, up to the {workspace.lift_height * 1e3:.0f} mm of a lift, reaches {-margin:.0f} "
+        "pixels out of the image; move the camera, or make workspace.region smaller",
     )
 
 

@@ -29,19 +29,26 @@ def check_dry_run(cell: Cell) -> Iterator[Finding]:
     try:
         go_home(cell)
         result = execute_grasp(cell, Grasp(position=np.array([x, y, z]), theta=np.asarray(0.0)))
-        go_home(cell)
     except HalError as error:
         yield Finding(level="fail", subject="dry run", text=str(error))
         return
     if result.aborted:
         yield Finding(level="fail", subject="dry run", text=result.aborted)
-    elif result.holding:
+        return
+    if result.holding:
         yield Finding(
             level="fail", subject="dry run",
             text="the hand reports a part where there is none: raise closed_width in the cell's file, or run "
             "hal.home",
         )  # fmt: skip
-    else:
+    try:
+        if result.holding:
+            cell.arm.open_gripper()  # over the empty region; a real arm goes home with an empty hand only
+        go_home(cell)
+    except HalError as error:
+        yield Finding(level="fail", subject="dry run", text=str(error))
+        return
+    if not result.holding:
         yield Finding(
             level="ok", subject="dry run",
             text=f"a grasp of nothing, {1e3 * IN_THE_AIR:.0f} mm over the lowest: nothing held, back home",

@@ -32,6 +32,7 @@ from hal.doctor.gripper import measure_gripper
 from hal.doctor.hand_checks import check_grip, check_hand
 from hal.errors import BadBackend
 from hal.open_cell import cell_from_values
+from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.console_table import report_console
@@ -40,7 +41,8 @@ from mskgrasp.runtime.options import parse
 DESCRIPTION = """Checks a cell and prints one line per check: ok, warn or fail, and the remedy.
 
 Drivers, connection, camera stream, calibration, workspace, the hand that the robot is configured for, the
-table's height in the depth image. Nothing moves without --move, --dry-run or --gripper. The last line says
+table's height in the depth image. Nothing moves without --move, --dry-run or --gripper, and with --move or
+--dry-run only once all checks have passed; before a real arm moves, its operator is asked. The last line says
 what to do next. The exit code is 0 if nothing failed, else 1.
 
 --gripper, on a real cell, measures instead what the hand truly does, for simulation to use: the hand is homed
@@ -58,12 +60,21 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
 
     Args:
         path: The cell file.
-        move: Also move the arm by small steps.
-        dry_run: Also go the whole way of a grasp of nothing, at a tenth of the speed.
+        move: Also move the arm by small steps, unless a check failed.
+        dry_run: Also go the whole way of a grasp of nothing, at a tenth of the speed, unless a check failed.
 
     Raises:
         BadConfig: The file cannot be read.
+        StoppedByOperator: The operator does not want the arm to move.
     """
+    found: list[Finding] = []
+    for finding in _examine(path, found, move=move, dry_run=dry_run):
+        found.append(finding)
+        yield finding
+
+
+def _examine(path: Path, found: Sequence[Finding], *, move: bool, dry_run: bool) -> Iterator[Finding]:
+    """As `examine`, which keeps ``found``, the findings until then."""
     values = read_yaml(path)
     yield from check_drivers(values)
     yield check_disk(Path.cwd())
@@ -96,13 +107,42 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
                 yield finding
         devices.callback(cell.camera.close)
         yield from _check_camera(cell)
-        if failed is not None and (move or dry_run):
-            yield Finding(level="fail", subject="motion", text="not checked: the arm is not connected")
+        if not (move or dry_run):
+            return
+        refusal = _failed("motion", found) or _unasked(cell)
+        if refusal is not None:
+            yield refusal
             return
         if move:
             yield from check_motion(cell.arm)
         if dry_run:
-            yield from check_dry_run(cell)
+            refusal = _failed("dry run", found)
+            yield from check_dry_run(cell) if refusal is None else (refusal,)
+
+
+def _failed(subject: str, found: Sequence[Finding]) -> Finding | None:
+    """The finding that a check was left out because an earlier one failed; None if none did."""
+    if all(finding.level != "fail" for finding in found):
+        return None
+    return Finding(level="fail", subject=subject, text="not checked: repair what failed first")
+
+
+def _unasked(cell: Cell) -> Finding | None:
+    """Ask once before a real arm moves; the finding that no operator can be asked, None if one agreed.
+
+    Raises:
+        StoppedByOperator: The operator does not want the arm to move.
+    """
+    try:
+        operator = Operator(cell)
+    except UsageError as error:
+        return Finding(level="fail", subject="motion", text=f"not checked: {error}")
+    if not operator.confirm(
+        "The arm and its fingers move. Is the cell clear, and your hand on the emergency stop? May the arm "
+        "move? y: yes, n: no: "
+    ):
+        raise StoppedByOperator("stopped by the operator; nothing moved")
+    return None
 
 
 def _check_camera(cell: Cell) -> Iterator[Finding]:

@@ -199,6 +199,13 @@ class Kinect2Camera(Camera):
         override = self._config.intrinsics.get(self._serial)
         if override is not None:
             return override.matrix()
+        if self._config.intrinsics:
+            _log.warning(
+                "camera.intrinsics names %s, not the connected camera %s: those of its calibration file, or "
+                "the factory's, are used; correct the serial number, or remove the key",
+                ", ".join(self._config.intrinsics),
+                self._serial,
+            )
         assert self._calibration is not None
         calibrated = self._calibration.intrinsics
         return factory if calibrated is None else np.asarray(calibrated, dtype=np.float64)

@@ -95,7 +95,7 @@ def arm_state(values: dict[str, Any], timestamp_s: float) -> ArmState:
     return ArmState(
         joints=np.array(values["joints"]),
         T_base_tcp=pose(values["T_base_tcp"]),
-        gripper_width=values["width"],
+        gripper_width=float(values["width"]),
         timestamp_s=timestamp_s,
         grasped=values.get("grasped"),
         max_width=values.get("max_width", MAX_OPENING),
@@ -103,8 +103,15 @@ def arm_state(values: dict[str, Any], timestamp_s: float) -> ArmState:
 
 
 def pose(values: list[float]) -> Pose:
-    """The pose that `plain` wrote."""
-    return Pose.from_vector(np.array(values, dtype=np.float64))
+    """The pose that `plain` wrote.
+
+    Raises:
+        ValueError: They are not seven numbers.
+    """
+    vector = np.array(values, dtype=np.float64)
+    if vector.shape != (7,):
+        raise ValueError(f"a pose is {values!r}, not x y z qw qx qy qz")
+    return Pose.from_vector(vector)
 
 
 def rebuild(error: tuple[str, str]) -> MskgraspError:

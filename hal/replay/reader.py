@@ -10,13 +10,14 @@ from typing import Any
 import h5py
 import numpy as np
 
+from hal.arm_state import GraspOutcome
 from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from hal.errors import BadRecording, MissingRecording
 from hal.gripper import FRANKA_HAND, GripperSpec
 from hal.keep_out import from_plain
 from hal.limits import ArmLimits
-from hal.replay.events import KIND, SCHEMA, Event, pose
+from hal.replay.events import KIND, SCHEMA, Event, arm_state, pose
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +121,23 @@ def _event(text: str) -> Event:
     error = values["error"]
     if not isinstance(values["arguments"], dict):
         raise ValueError(f"the arguments of {values['call']} are {values['arguments']!r}")
-    return Event(**{**values, "error": None if error is None else (str(error[0]), str(error[1]))})
+    event = Event(**{**values, "error": None if error is None else (str(error[0]), str(error[1]))})
+    _check_answer(event)
+    return event
+
+
+def _check_answer(event: Event) -> None:
+    """Rebuild what a call answered, as a playback does; raises what a broken answer raises."""
+    if event.after is not None:
+        arm_state(event.after, 0.0)
+    if event.error is not None:
+        return
+    if event.call == "state":
+        arm_state(event.result, 0.0)
+    elif event.call == "grasp":
+        GraspOutcome(**event.result)
+    elif event.call == "part_pose" or (event.call == "move_until_contact" and event.result is not None):
+        pose(event.result)
 
 
 def _check_frames(group: Any) -> int:

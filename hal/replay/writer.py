@@ -41,8 +41,7 @@ class RecordingWriter:
 
     def __init__(self, path: Path, workspace: Workspace, arm: Arm):
         self._path = path
-        if path.exists():
-            raise UsageError(f"{path} exists already; move it away or choose another file")
+        self._refuse_existing()
         if self.part.exists():
             raise UsageError(
                 f"{self.part} is there, of a program that is recording or was killed; move it away (it can "
@@ -61,7 +60,13 @@ class RecordingWriter:
         return self._path.with_name(self._path.name + ".part")
 
     def open(self) -> None:
-        """Create the file for its first user."""
+        """Create the file for its first user.
+
+        Raises:
+            UsageError: It exists, of a connection before this one, or cannot be written.
+        """
+        if self._file is None:
+            self._refuse_existing()
         self._users += 1
         if self._file is None:
             try:
@@ -83,6 +88,10 @@ class RecordingWriter:
             )
             self._file.create_dataset("events", (0,), h5py.string_dtype(), maxshape=(None,), chunks=(64,))
             self._file.flush()
+
+    def _refuse_existing(self) -> None:
+        if self._path.exists():
+            raise UsageError(f"{self._path} exists already; move it away or choose another file")
 
     def close(self) -> None:
         """Finish the file after its last user; delete one without calls (the cell did not open)."""

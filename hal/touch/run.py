@@ -37,11 +37,11 @@ it is. See docs/touch.md.
 python -m hal.touch --cell configs/cells/panda_kinect2.yaml --table-at 0.01"""
 
 
-def measure(config: TouchConfig) -> tuple[TableReport, Operator]:
+def measure(config: TouchConfig) -> tuple[TableReport, Operator | None]:
     """Touch the table of a cell and write the report; the cell's file stays as it is.
 
     Returns:
-        The report, and the operator who was asked.
+        The report, and the operator who was asked; None: the arm is simulated.
 
     Raises:
         UsageError: The cell is of another kind, or the height by tape is missing.
@@ -91,7 +91,7 @@ def measure(config: TouchConfig) -> tuple[TableReport, Operator]:
     draw_table(report, config.out / "table.png")
     text = json.dumps(report.to_json(), indent=1, allow_nan=False)
     write_whole(config.out / "table.json", (text + "\n").encode())
-    return report, operator
+    return report, None if cell.arm.simulated else operator
 
 
 def _stated_height(values: dict[str, Any], config: TouchConfig) -> float | None:
@@ -118,7 +118,7 @@ def main() -> int:
     report, operator = measure(config)
     print("\n".join(report.lines()))
     print(f"wrote {config.out}/table.json and {config.out}/table.png")
-    if "workspace" not in read_yaml(config.cell):
+    if operator is None or "workspace" not in read_yaml(config.cell):
         return 0
     slope = None if report.plane.level else report.plane.slope
     if not operator.confirm(f"Write this into {config.cell}? y: yes, n: no: "):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NoReturn
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def touch_table(
         (5, 3) touched points, base frame, metres.
 
     Raises:
-        TableNotFound: The fingers met nothing there, or something above it.
+        TableNotFound: The fingers met nothing there, or something above it; the hand has risen from there.
         HalError: The arm was stopped or lost, or cannot reach the points.
     """
     arm, workspace = cell.arm, cell.workspace
@@ -78,7 +79,8 @@ def touch_table(
     arm.move_gripper(0.0)
     arm.move_to_pose(_above(places[0], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
     first = _touch(arm, places[0], workspace.table_z - search, force, 2 * speed)
-    _check_found(first, places[0], workspace, search)
+    if (fault := _fault_of_first(first, places[0], workspace, search)) is not None:
+        _retreat(arm, workspace, fault)
     assert first is not None
     travel = max(first[2], workspace.table_z) + ABOVE
     points = []
@@ -87,7 +89,8 @@ def touch_table(
         arm.move_to_pose(_above(here[:2], travel), speed=_TRAVEL_SPEED)
         arm.move_to_pose(_above(place, travel), speed=_TRAVEL_SPEED)
         point = _touch(arm, place, first[2] - BELOW, force, speed)
-        _check_found(point, place, workspace, search)
+        if (fault := _fault_of_later(point, place, first[2], workspace.table_z + search)) is not None:
+            _retreat(arm, workspace, fault)
         assert point is not None
         touched(number, point)
         points.append(point)
@@ -108,14 +111,53 @@ def _touch(arm: Arm, xy: np.ndarray, lowest: float, force: float, speed: float) 
     return None if contact is None else contact.apply(np.array([0.0, 0.0, PAD_REACH]))
 
 
-def _check_found(point: np.ndarray | None, place: np.ndarray, workspace: Workspace, search: float) -> None:
+def _retreat(arm: Arm, workspace: Workspace, fault: str) -> NoReturn:
+    """Raise the hand straight up from where the search ended, and report.
+
+    Raises:
+        TableNotFound: Always, unless the hand could not rise.
+        HalError: The hand could not rise.
+    """
+    error = TableNotFound(fault)
+    here = arm.state().T_base_tcp.position
+    try:
+        arm.move_to_pose(_above(here[:2], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
+    except HalError as stuck:
+        raise stuck from error
+    raise error
+
+
+def _fault_of_first(
+    point: np.ndarray | None, place: np.ndarray, workspace: Workspace, search: float
+) -> str | None:
+    """Why the first point is not on the table, and the remedy; None if it is."""
     where = f"({place[0]:.3f}, {place[1]:.3f}) m"
     stated = f"within {search * 1e3:g} mm of the height {workspace.table_z:.4f} m that is stated for it"
     remedy = "measure it by tape and give it as --table-at Z (base frame, m)"
     if point is None:
-        raise TableNotFound(f"the fingers met no table at {where} {stated}; {remedy}")
+        return f"the fingers met no table at {where} {stated}; {remedy}"
     if point[2] > workspace.table_z + search:
-        raise TableNotFound(
+        return (
             f"the fingers met something at {where}, {point[2]:.4f} m high, and no table {stated}; clear the "
             f"region, or {remedy}"
         )
+    return None
+
+
+def _fault_of_later(
+    point: np.ndarray | None, place: np.ndarray, first_z: float, highest: float
+) -> str | None:
+    """Why a later point is not on the table, and the remedy; None if it is."""
+    where = f"({place[0]:.3f}, {place[1]:.3f}) m"
+    if point is None:
+        return (
+            f"the fingers met no table at {where} within {BELOW * 1e3:g} mm under the first contact, which "
+            f"was {first_z:.4f} m high; keep workspace.region on the table, away from its edges, and clear "
+            "what the first touch may have met"
+        )
+    if point[2] > highest:
+        return (
+            f"the fingers met something at {where}, {point[2]:.4f} m high, "
+            f"{(point[2] - first_z) * 1e3:.1f} mm over the first contact; clear the region and touch it again"
+        )
+    return None

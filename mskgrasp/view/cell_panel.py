@@ -9,6 +9,7 @@ from viser import GuiButtonHandle, GuiEvent
 
 from hal import go_home, put_down
 from hal.camera import RgbdFrame
+from hal.errors import HandFull
 from hal.simulated import SimulatedWorld
 from mskgrasp.core.errors import NoGraspFound, NoPartFound
 from mskgrasp.core.geometry import Pose
@@ -174,6 +175,7 @@ class CellPanel(Panel):
 
         Raises:
             NotCalibrated: The camera's pose was measured by hand; nothing moves.
+            HandFull: The hand holds something, such as of an earlier program; nothing moves.
             HalError: The cell was lost, or the arm was stopped.
         """
         frame, tallest = self._frame, self.engine.passed
@@ -182,6 +184,11 @@ class CellPanel(Panel):
         if plan is not self.plan:
             self.page.tell("the plan has changed since; nothing moved")
             return
+        if self.cell.arm.in_hand() is not None:
+            raise HandFull(
+                "the hand holds something, which would fall as the fingers open; nothing moved: hold it, "
+                "press 'recover and go home', then plan again"
+            )
         self._set_plan(None)  # the part will lie elsewhere
         self.page.tell("the arm moves ...")
         with self.arm.in_motion():

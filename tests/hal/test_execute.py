@@ -242,6 +242,20 @@ def test_a_hand_that_opens_less_far_opens_as_far_as_it_does(cell: Cell, arm: Wri
         arm.move_gripper(0.08)
 
 
+def test_a_hand_that_opens_farther_than_its_stroke_opens_all_the_way(
+    cell: Cell, arm: WritingArm, monkeypatch: pytest.MonkeyPatch
+):
+    """Homing found 81.5 mm; no width over 80 mm may be asked for."""
+    state = ToyArm._state
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(arm), max_width=0.0815))
+    monkeypatch.setattr(arm, "_known_width", lambda: 0.0815)
+    for width, opening in ((0.061, None), (0.0755, 0.0)):  # to 81 mm, and to 81.5 mm
+        arm._width = width
+        arm.log.clear()
+        let_go(cell, GRASP, opening=opening)
+        assert arm.log[0] == ("gripper", 0.0815)
+
+
 def test_a_part_lost_on_the_way_up_was_lifted_and_is_not_held(cell: Cell, arm: WritingArm, monkeypatch):
     monkeypatch.setattr(arm, "_wait", lambda _: setattr(arm, "_width", 0.0004))
     result = execute_grasp(cell, GRASP)

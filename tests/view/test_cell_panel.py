@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from hal.arm_state import Held
 from hal.errors import CommunicationLost
 from hal.simulated import SimulatedArm
 from mskgrasp.core.config import Config
@@ -183,6 +184,19 @@ def test_a_person_who_lets_a_real_arm_recover_holds_what_is_in_its_hand(
     question.buttons["yes, move"].value = True
     work(page)
     assert len(homed) == 1 and homed[0]["take"]()
+
+
+def test_a_grasp_does_not_drop_what_an_earlier_program_left_in_the_hand(
+    page: Page, engine: TrialEngine, monkeypatch
+):
+    panel = panel_of(page, engine, allow_motion=True)
+    panel.plan_once()
+    arm = engine.cell.arm
+    monkeypatch.setattr(arm, "in_hand", lambda: Held(T_base_tcp=None, width=0.03))
+    monkeypatch.setattr(arm, "open_gripper", lambda: pytest.fail("the fingers opened"))
+    asked(page, panel._ask_to_execute).buttons["yes, move"].value = True
+    work(page)
+    assert "the hand holds something, which would fall" in page.said and panel.plan is not None
 
 
 def test_a_part_that_is_not_known_is_not_presented_anew(page: Page, engine: TrialEngine, monkeypatch):

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from hal.calibrate.config import CalibrateConfig
+from hal.calibrate.hand_eye import MIN_SPREAD_RAD, MIN_VIEWS, spread
 from mskgrasp.core.config import check_config
 from mskgrasp.core.errors import BadConfig
+from tests.hal.calibrate.test_hand_eye import hand_poses
 
 
 @pytest.mark.parametrize(
@@ -49,6 +51,7 @@ def test_a_camera_measured_by_hand_looks_where_it_is_pointed(
     ("values", "message"),
     [
         ({"poses": 7}, "'poses': input should be greater than or equal to 8"),
+        ({"tilt_deg": 24}, "'tilt_deg': input should be greater than or equal to 25"),
         ({"tilt_deg": 60}, "'tilt_deg': input should be less than or equal to 50"),
         ({"board_turn_deg": 181}, "'board_turn_deg'"),
         ({"camera_towards": (0.5, 0, 0)}, "give camera_at, too"),
@@ -68,3 +71,9 @@ def test_a_wrong_value_is_one_line_that_names_it(values: dict, message: str):
     with pytest.raises(BadConfig) as caught:
         check_config(CalibrateConfig, values, "calibration")
     assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_the_least_tilt_determines_the_camera_with_the_fewest_pictures():
+    config = check_config(CalibrateConfig, {"tilt_deg": 25, "poses": MIN_VIEWS}, "calibration")
+    for seed in range(40):
+        assert spread(hand_poses(config.poses, config.tilt_deg, seed))[1] > MIN_SPREAD_RAD, seed

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -167,6 +169,27 @@ def test_a_board_far_away_is_refused():
     )
     views = views_of([next(poses) for _ in range(10)], 0.0, camera=far)
     assert "pixels wide in the image, at least 9" in refused(views)
+
+
+@pytest.mark.parametrize(
+    ("n_flat", "tilt_deg", "n_tilted", "seed", "message"),
+    [
+        (12, 4, 5, 0, r"second axis in the 12 pictures that agree \(5 contradict them\), at least 8 are"),
+        (12, 2, 6, 1, r"does not repeat: two halves of the pictures place the board 3\d\.\d mm apart"),
+    ],
+    ids=["all tilted pictures rejected", "one left"],
+)
+def test_a_board_that_slips_as_it_is_tilted_is_refused(
+    n_flat: int, tilt_deg: float, n_tilted: int, seed: int, message: str
+):
+    """What is left once the tilted pictures are rejected does not determine the camera."""
+    poses = hand_poses(n_flat, tilt_deg, seed) + hand_poses(n_tilted, 45, seed + 50)
+    views = views_of(poses, 0.1, seed)
+    for i in range(n_flat, len(views)):
+        slipped = Pose(position=poses[i].position + [0.02, 0.01, 0], quat_wxyz=poses[i].quat_wxyz)
+        views[i] = View(T_base_tcp=slipped, corners=views[i].corners, intrinsics=INTRINSICS)
+    text = refused(views)
+    assert re.search(message, text) and "take the pictures again" in text
 
 
 def test_a_board_that_slips_in_the_hand_is_refused():

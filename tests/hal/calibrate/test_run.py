@@ -27,7 +27,7 @@ from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.core.geometry import pose_distance
 from tests.hal.calibrate.toy_bench import BOARD as TOY_BOARD
 from tests.hal.calibrate.toy_bench import HELD, bench
-from tests.programs import running
+from tests.programs import run_here, running
 
 SAPIEN = Path(__file__).parents[3] / "configs" / "cells" / "sapien.yaml"
 BOARD = Board()
@@ -83,13 +83,34 @@ def test_the_pictures_can_be_solved_again_into_a_file_that_can_be_read(folder: P
     assert (tmp_path / "residuals.png").stat().st_size > 10_000
 
 
+def test_pictures_solved_again_replace_the_calibration_in_their_own_folder_alone(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.chdir(tmp_path)
+    other = tmp_path / "out" / "calibration" / "calibration.yaml"
+    other.parent.mkdir(parents=True)
+    other.write_text("another camera")
+    (tmp_path / "mine").mkdir()
+    for index, picture in enumerate(taken("laser")):
+        write_picture(tmp_path / "mine" / f"pose-{index:03d}.npz", picture)
+    done = run_here(run.main, "--from", "mine")
+    assert done.returncode == 0 and "residuals.png in mine;" in done.stdout, done.stderr
+    assert (tmp_path / "mine" / "calibration.yaml").is_file() and other.read_text() == "another camera"
+    assert run_here(run.main, "--from", "nowhere").returncode == 2 and not Path("nowhere").exists()
+
+
 def test_the_board_of_stored_pictures_is_theirs_but_for_what_options_state(tmp_path: Path, capsys):
     path = tmp_path / "board.yaml"
     write_config(Board(columns=7, square=0.05, marker=0.04), path)
     assert _stored_board(path, Board()) == Board(columns=7, square=0.05, marker=0.04)
-    assert capsys.readouterr().err == ""
+    # --board.square 0.04 states the default, and is not what is used.
+    assert f"board: as in {path} (columns 7, square 0.05, marker 0.04; to use" in capsys.readouterr().err
     assert _stored_board(path, Board(square=0.049)) == Board(columns=7, square=0.049, marker=0.04)
-    assert "board: square 0.049, else as in" in capsys.readouterr().err
+    assert f"board: square 0.049, else as in {path} (columns 7, marker 0.04;" in capsys.readouterr().err
+    write_config(Board(), path)
+    assert _stored_board(path, Board()) == Board()
+    assert capsys.readouterr().err == ""
+    write_config(Board(columns=7, square=0.05, marker=0.04), path)
     with pytest.raises(BadConfig, match="marker 0.04 m must be"):
         _stored_board(path, Board(square=0.041, marker=0.03).model_copy(update={"marker": 0.03}))
 

@@ -65,6 +65,15 @@ def test_a_region_out_of_the_image_is_found():
     assert finding.level == "fail" and "out of the image" in finding.text
 
 
+def test_a_region_that_leaves_the_image_at_the_height_of_a_lift_is_found():
+    """At 0.8 m the image shows 0.35 m of the table, 0.1 m higher 0.31 m."""
+    wide = dataclasses.replace(WORKSPACE, region=(0.335, 0.665, -0.12, 0.12))
+    (finding,) = check_view(frame_of_table(), wide)
+    assert finding.level == "fail" and "up to the 100 mm of a lift, reaches 7 pixels out" in finding.text
+    low = dataclasses.replace(wide, lift_height=0.01)
+    assert [f.level for f in check_view(frame_of_table(), low)] == ["ok"]
+
+
 @pytest.mark.parametrize(
     ("position", "quat_wxyz", "words"),
     [

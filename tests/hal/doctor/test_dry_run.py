@@ -12,10 +12,11 @@ from hal import Cell, open_cell
 from hal.doctor import dry_run
 from hal.doctor.dry_run import PACE, check_dry_run
 from hal.doctor.run import examine
-from hal.errors import NotConnected, OutOfWorkspace
+from hal.errors import MotionAborted, NotConnected, OutOfWorkspace
 from hal.franka import FrankaArm
 from mskgrasp.core.shipped import config_file
 from tests.hal.real_cell import measured_cell
+from tests.hal.replay.toy import toy_cell
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +43,29 @@ def test_a_hand_that_holds_nothing_and_says_otherwise_is_found(cell: Cell, monke
     )
     (finding,) = check_dry_run(cell)
     assert finding.level == "fail" and "closed_width" in finding.text
+
+
+def test_a_real_arm_that_believes_it_holds_something_opens_its_fingers_and_goes_home():
+    """The toy arm is no simulated one, and its hand always reports a part."""
+    cell = toy_cell()
+    with cell.arm as arm:
+        (finding,) = check_dry_run(cell)
+        assert finding.level == "fail" and "closed_width" in finding.text
+        state = arm.state()
+        assert state.joints == pytest.approx(cell.workspace.home) and state.gripper_width == 0.08
+
+
+def test_an_arm_that_met_something_stays_there_and_the_reason_is_the_finding(monkeypatch):
+    cell = toy_cell()
+
+    def met(force: float) -> None:
+        raise MotionAborted("contact force over 20 N: the arm stopped")
+
+    monkeypatch.setattr(cell.arm, "_grasp", met)
+    with cell.arm as arm:
+        (finding,) = check_dry_run(cell)
+        assert finding.level == "fail" and finding.text == "contact force over 20 N: the arm stopped"
+        assert arm.state().T_base_tcp.position[:2] == pytest.approx(cell.workspace.centre)
 
 
 def test_what_stops_the_arm_is_the_finding(cell: Cell, monkeypatch):

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import io
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
+from hal.doctor import run
 from hal.doctor.checks import Finding
 from hal.doctor.config import DoctorConfig
 from hal.doctor.run import examine, next_step
+from hal.mujoco.arm import MujocoArm
+from hal.operator import Operator, StoppedByOperator
 from mskgrasp.core.errors import BadConfig
 from tests.hal.franka.robots import fci5, write_cell
+from tests.hal.touch.tables import CELLS, simulated_file
 
 
 def test_an_arms_driver_in_the_place_of_a_camera_is_a_finding(tmp_path: Path):
@@ -35,6 +42,58 @@ def test_a_cell_without_its_devices_says_what_is_missing_and_goes_on(tmp_path: P
     for subject in ("driver kinect2", "calibration", "camera", "arm", "motion"):
         assert findings[subject].level == "fail", findings[subject]
     assert all("\n" not in finding.text for finding in findings.values())
+
+
+@pytest.fixture
+def moves(monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
+    """Joints to which the arm of a simulated cell, here taken for a real one, is sent."""
+    sent: list[np.ndarray] = []
+    move = MujocoArm.move_to_joints
+    monkeypatch.setattr(MujocoArm, "simulated", False)
+    monkeypatch.setattr(
+        MujocoArm, "move_to_joints", lambda arm, to, **how: sent.append(to) or move(arm, to, **how)
+    )
+    return sent
+
+
+def operator_answers(monkeypatch: pytest.MonkeyPatch, answers: str) -> io.StringIO:
+    """The operator of a real arm answers this; what they are asked."""
+    asked = io.StringIO()
+    monkeypatch.setattr(run, "Operator", partial(Operator, answers=io.StringIO(answers), prompts=asked))
+    return asked
+
+
+def test_after_a_failed_check_nothing_moves_and_nothing_is_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: list[np.ndarray]
+):
+    """The table stands 5 mm higher than the file says."""
+    asked = operator_answers(monkeypatch, "")
+    found = list(examine(simulated_file(tmp_path, "mujoco", height=0.005), move=True, dry_run=True))
+    assert [finding.subject for finding in found if finding.level == "fail"] == ["table", "motion"]
+    assert found[-1].text == "not checked: repair what failed first"
+    assert moves == [] and asked.getvalue() == ""
+
+
+def test_an_operator_is_asked_once_before_a_real_arm_moves(
+    monkeypatch: pytest.MonkeyPatch, moves: list[np.ndarray]
+):
+    asked = operator_answers(monkeypatch, "n\n")
+    with pytest.raises(StoppedByOperator, match="nothing moved"):
+        list(examine(CELLS / "mujoco.yaml", move=True, dry_run=True))
+    assert moves == [] and asked.getvalue().count("May the arm move?") == 1
+    asked = operator_answers(monkeypatch, "y\n")
+    found = {finding.subject: finding.level for finding in examine(CELLS / "mujoco.yaml", move=True)}
+    assert found["joint motion"] == found["gripper"] == "ok" and len(moves) == 2
+    assert asked.getvalue().count("May the arm move?") == 1
+
+
+def test_a_real_arm_does_not_move_where_no_operator_can_be_asked(
+    monkeypatch: pytest.MonkeyPatch, moves: list[np.ndarray]
+):
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    *_, last = examine(CELLS / "mujoco.yaml", move=True)
+    assert (last.level, last.subject) == ("fail", "motion") and moves == []
+    assert "standard input is no terminal" in last.text and "\n" not in last.text
 
 
 def test_a_wrong_cell_file_is_a_finding_and_a_missing_one_an_error(tmp_path: Path):

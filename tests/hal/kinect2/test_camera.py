@@ -19,6 +19,7 @@ import pytest
 from hal import driver_process
 from hal.errors import CaptureFailed, CommunicationLost, DriverMissing, NotConnected
 from hal.kinect2 import Kinect2Camera, Kinect2Config
+from hal.kinect2.config import PinholeIntrinsics
 from mskgrasp.core.config import check_config, read_yaml
 from mskgrasp.core.errors import BadConfig, MarkersNotFound, MskgraspError, NoPartFound
 from mskgrasp.perception.markers import find_markers
@@ -223,6 +224,16 @@ def test_a_cold_camera_says_that_its_depth_drifts(bench: Bench, caplog: pytest.L
     with caplog.at_level(logging.WARNING), bench.camera(warm_up_s=1200):
         pass
     assert "drifts by millimetres for the first 20 minutes" in caplog.text
+
+
+def test_intrinsics_of_another_camera_are_not_used_and_named_once(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+):
+    other = {"000000000001": PinholeIntrinsics(fx=360, fy=361, cx=250, cy=200)}
+    with caplog.at_level(logging.WARNING), bench.camera(intrinsics=other) as camera:
+        for _ in range(2):
+            assert camera.capture().intrinsics[0, 0] == pytest.approx(365.456)
+    assert caplog.text.count(f"names 000000000001, not the connected camera {SERIAL}") == 1
 
 
 TABLE = (0.5, 0.0, 0.4, 0.4, 0.0, 139)

@@ -29,6 +29,11 @@ from tests.hal.replay.toy import ToyCamera, toy_cell
         (lambda path: change_event(path, error=[]), "damaged or no recording"),
         (lambda path: change_event(path, arguments=None), "the arguments of capture are None"),
         (lambda path: change_event(path, result=[[]]), "damaged or no recording"),
+        (lambda path: change_event(path, "state", result={}), "damaged or no recording ('joints')"),
+        (lambda path: change_event(path, "state", result=None), "damaged or no recording"),
+        (lambda path: change_event(path, "grasp", result={"width": 0.03}), "damaged or no recording"),
+        (lambda path: change_event(path, "grasp", after={"joints": []}), "damaged or no recording"),
+        (lambda path: change_event(path, "part_pose", result=[0.4, 0.1]), "a pose is [0.4, 0.1], not x y z"),
     ],
 )
 def test_a_wrong_file_is_one_line(recording: Path, tmp_path: Path, spoil, message: str):
@@ -40,11 +45,10 @@ def test_a_wrong_file_is_one_line(recording: Path, tmp_path: Path, spoil, messag
     assert message in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def change_event(path: Path, **changes) -> None:
+def change_event(path: Path, call: str = "capture", **changes) -> None:
     def spoil(file: h5py.File) -> None:
         events = [json.loads(text) for text in file["events"].asstr()[:]]
-        capture = next(one for one in events if one["call"] == "capture")
-        capture.update(changes)
+        next(one for one in events if one["call"] == call).update(changes)
         file["events"][:] = [json.dumps(one) for one in events]
 
     change(path, spoil)

@@ -93,6 +93,21 @@ def test_ctrl_c_while_a_frame_is_written_leaves_it_whole(tmp_path: Path, monkeyp
     assert found.n_frames == 3 and [event.result for event in found.events if not event.error] == [0, 2]
 
 
+def test_a_cell_that_is_connected_twice_keeps_the_recording_of_the_first_time(tmp_path: Path):
+    out = tmp_path / "run.h5"
+    cell = recorded_cell(toy_cell(), out)
+    with cell.connected():
+        cell.camera.capture()
+    for _ in range(2):
+        with pytest.raises(UsageError, match="run.h5 exists already; move it away"), cell.connected():
+            pass
+    assert read_recording(out).n_frames == 1 and list(tmp_path.iterdir()) == [out]
+    out.rename(tmp_path / "first.h5")
+    with cell.connected():
+        cell.arm.state()
+    assert [event.call for event in read_recording(out).events] == ["state"]
+
+
 def test_a_recording_is_not_overwritten(recording: Path):
     with pytest.raises(UsageError, match="exists already"):
         recorded_cell(toy_cell(), recording)

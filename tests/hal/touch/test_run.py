@@ -21,7 +21,7 @@ from hal.touch import touches
 from tests.hal.franka.robots import robot_for, write_cell
 from tests.hal.real_cell import REAL, REPLAYED
 from tests.hal.replay.toy import toy_cell
-from tests.hal.touch.tables import CELLS, feeling_cell, simulated_file, tilted
+from tests.hal.touch.tables import CELLS, FeelingArm, feeling_cell, simulated_file, tilted
 from tests.programs import run_here
 
 QUICK = ("--speed", "0.025")
@@ -195,6 +195,16 @@ def test_an_operator_who_agrees_twice_gets_the_file_written(monkeypatch: pytest.
         "table_z: null   # tape\n", "table_z: 0.013   # tape\n  table_slope: [0.008, 0.0]\n"
     )
     assert sorted(found.name for found in (tmp_path / "out").iterdir()) == ["table.json", "table.png"]
+
+
+def test_the_file_of_a_simulated_arm_keeps_its_workspace(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    answers = [True, True]
+    path = felt(monkeypatch, tmp_path, answers)
+    monkeypatch.setattr(FeelingArm, "simulated", True)
+    before, out = path.read_text(), str(tmp_path / "out")
+    done = run_here(touch.main, "--cell", str(path), "--table-at", "0.0", "--out", out)
+    assert done.returncode == 0 and (tmp_path / "out" / "table.json").is_file(), done.stderr
+    assert path.read_text() == before and answers == [True]  # only whether the arm may move
 
 
 def test_an_operator_who_does_not_want_the_file_written_keeps_it(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hal.errors import CommunicationLost, NeedsRecovery
 from hal.touch.touches import PART_ROOM, TableNotFound, touch_points, touch_table
+from mskgrasp.core.grasp import PAD_REACH
 from tests.hal.touch.tables import REGION, FeelingArm, feeling_cell, tilted
 
 
@@ -48,21 +50,67 @@ def test_the_first_contact_is_made_twice_as_fast_and_none_with_another_force():
         assert cell.arm.state().joints == pytest.approx(cell.workspace.home)
 
 
-@pytest.mark.parametrize(
-    ("height", "message"),
+STATED = "30 mm of the height 0.0000 m"
+NOT_FOUND = pytest.mark.parametrize(
+    ("height", "message", "remedy"),
     [
-        (lambda xy: -0.2, "met no table at"),
-        (lambda xy: 0.06, "met something at .* 0.0600 m high"),
-        (lambda xy: -0.2 if xy[0] > 0.5 else 0.0, r"met no table at \(0.620, -0.120\)"),
+        (lambda xy: -0.2, f"met no table at .*{STATED}", "--table-at Z"),
+        (lambda xy: 0.06, f"met something at .* 0.0600 m high.*{STATED}", "--table-at Z"),
+        (
+            lambda xy: -0.2 if xy[0] > 0.5 else 0.0,
+            r"met no table at \(0.620, -0.120\) m within 15 mm under the first contact, which was 0.0000 m",
+            "keep workspace.region on the table",
+        ),
+        (
+            lambda xy: 0.035 if xy[0] > 0.5 else 0.02,
+            r"met something at \(0.620, -0.120\) m, 0.0350 m high, 15.0 mm over the first",
+            "clear the region",
+        ),
     ],
-    ids=["too low", "too high", "ends"],
+    ids=["too low", "too high", "ends", "covered"],
 )
+"""Heights at points (2,) of what the fingers meet, where a table is stated at 0."""
+
+
+@NOT_FOUND
 def test_a_table_that_is_not_found_is_one_line_with_the_remedy(
-    height: Callable[[np.ndarray], float], message: str
+    height: Callable[[np.ndarray], float], message: str, remedy: str
 ):
     with pytest.raises(TableNotFound, match=message) as caught:
         touches(height)
-    assert "--table-at Z" in str(caught.value) and "\n" not in str(caught.value)
+    assert remedy in str(caught.value) and "\n" not in str(caught.value)
+
+
+@NOT_FOUND
+def test_the_closed_hand_rises_straight_from_where_it_found_no_table(
+    height: Callable[[np.ndarray], float], message: str, remedy: str
+):
+    cell = feeling_cell(height)
+    with cell.arm:
+        with pytest.raises(TableNotFound):
+            touch_table(cell, search=0.03, force=5.0, speed=0.01)
+        state = cell.arm.state()
+    x = 0.62 if height(np.array([0.62, 0.0])) != height(np.array([0.38, 0.0])) else 0.38
+    assert state.T_base_tcp.position == pytest.approx([x, -0.12, 0.12 + PAD_REACH])
+    assert state.gripper_width == 0.0
+
+
+def test_a_hand_that_cannot_rise_says_why_and_keeps_the_first_fault(monkeypatch: pytest.MonkeyPatch):
+    cell = feeling_cell(lambda xy: -0.2)
+    assert isinstance(cell.arm, FeelingArm)
+    search = cell.arm._move_until_contact
+
+    def lose_afterwards(*how: Any) -> None:
+        search(*how)
+        monkeypatch.setattr(cell.arm, "_move_to_pose", lose)
+
+    def lose(*_: object) -> None:
+        raise CommunicationLost("the cable was pulled")
+
+    monkeypatch.setattr(cell.arm, "_move_until_contact", lose_afterwards)
+    with cell.arm, pytest.raises(CommunicationLost, match="the cable was pulled") as caught:
+        touch_table(cell, search=0.03, force=5.0, speed=0.01)
+    assert isinstance(caught.value.__cause__, TableNotFound)
 
 
 def test_an_arm_that_is_lost_in_the_middle_is_stopped(monkeypatch: pytest.MonkeyPatch):
