@@ -83,8 +83,8 @@ def find_part_pixels(
         part_height: Height of a known part as it lies flattest, metres; infinite: it is not known.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, a noisy camera measures the table more than
-            ``min_height`` from ``table_z``, or the image is no depth in metres.
+        NoPartFound: Nothing rises above the table there, no pixel there has a depth, a noisy camera measures
+            the table more than ``min_height`` from ``table_z``, or the image is no depth in metres.
     """
     depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
     points = _points_base(depth, intrinsics, T_base_camera)
@@ -93,6 +93,12 @@ def find_part_pixels(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
+    if not near.any():
+        raise NoPartFound(
+            f"no pixel in the region has a depth (x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}): the "
+            "camera does not see it, or measures nothing there; check the region, the camera's pose, its "
+            "range and its exposure"
+        )
     table_offset = 0.0
     noise = _noise(heights, near)
     if noise > QUIET:
@@ -118,10 +124,10 @@ def find_part_pixels(
         raised, mask, n_other = _raised_group(heights, near, half, noise)
         mask = None if _is_mostly_raised(raised, near) else mask
     if mask is None:
-        highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
-            f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
+            f"{tops[near].max() * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the "
+            "camera's pose"
         )
     return FoundPart(
         depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other

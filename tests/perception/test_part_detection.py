@@ -99,6 +99,14 @@ def test_pixels_without_a_depth_are_left_out(nothing):
     assert synthetic.view(partly).size == pytest.approx(synthetic.view(depth).size)
 
 
+def test_a_region_without_a_depth_is_reported_as_such():
+    depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=(0.06, 0.03, 0.03))])
+    hole = np.where(np.pad(np.ones((156, 156), bool), 2), np.float32(np.nan), depth)
+    for image, region in ((depth, (2.0, 2.2, 0.0, 0.2)), (hole, REGION)):
+        with pytest.raises(NoPartFound, match=r"no pixel in the region has a depth \(x "):
+            view_part(image, INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=region)
+
+
 def noisy_view(depth, model, seed, min_height=0.003, **known):
     noisy = add_noise(depth, INTRINSICS, SensorNoise(model=model), np.random.default_rng(seed))
     return view_part(
