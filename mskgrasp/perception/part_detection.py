@@ -84,7 +84,8 @@ def find_part_pixels(
 
     Raises:
         NoPartFound: Nothing rises above the table there, no pixel there has a depth, a noisy camera measures
-            the table more than ``min_height`` from ``table_z``, or the image is no depth in metres.
+            the table more than ``min_height`` from ``table_z``, the part reaches too far beyond the region,
+            or the image is no depth in metres.
     """
     depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
     points = _points_base(depth, intrinsics, T_base_camera)
@@ -113,21 +114,27 @@ def find_part_pixels(
             )
         tops, heights = tops - table_offset, heights - table_offset
     raised, mask, n_other = _raised_group(heights, near, min_height, noise)
-    if _is_mostly_raised(raised, near):
+    if _share(raised, near) > MOST_RAISED:
         raise NoPartFound(
-            f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
+            f"{_share(raised, near):.0%} of the region rise more than {min_height * 1e3:g} mm above the "
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera again"
         )
     half = max(part_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise)
     if mask is None and half < min_height:
         raised, mask, n_other = _raised_group(heights, near, half, noise)
-        mask = None if _is_mostly_raised(raised, near) else mask
+        mask = None if _share(raised, near) > MOST_RAISED else mask
     if mask is None:
         raise NoPartFound(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
             f"{tops[near].max() * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the "
             "camera's pose"
+        )
+    if (_grown(mask) & raised & ~near).any():
+        raise NoPartFound(
+            f"the part reaches more than {REGION_MARGIN * 100:g} cm beyond the region "
+            f"(x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it towards the middle, or clear away "
+            "what else is there"
         )
     return FoundPart(
         depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other
@@ -137,18 +144,18 @@ def find_part_pixels(
 def _raised_group(
     heights: np.ndarray, near: np.ndarray, least: float, noise: float
 ) -> tuple[np.ndarray, np.ndarray | None, int]:
-    """Find the pixels higher than ``least``, their largest group, and the size of the second largest."""
+    """Find the pixels higher than ``least``, their largest group nearby, and the second largest's size."""
     reach, link_height = 1, least
     if noise > QUIET:
         reach, heights = 5, _mean(heights, 2 * least)
         link_height = min(least, max(least / 2, LINK_DEVIATIONS * MEAN_NOISE * noise))
-    raised = near & (heights > least)
-    return raised, *_largest_group(raised, near & (heights > link_height), reach)
+    raised = heights > least
+    return raised, *_largest_group(raised & near, near & (heights > link_height), reach)
 
 
-def _is_mostly_raised(raised: np.ndarray, near: np.ndarray) -> bool:
-    """Whether more of the region is raised than a part may cover."""
-    return bool(raised.sum() > MOST_RAISED * max(near.sum(), 1))
+def _share(raised: np.ndarray, near: np.ndarray) -> float:
+    """Compute the share of the pixels nearby that are raised."""
+    return np.count_nonzero(raised & near) / np.count_nonzero(near)
 
 
 def view_part(
@@ -179,8 +186,8 @@ def view_part(
         alone: Refuse a second part; in a noisy image one that is more than four pixels away.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
-            the image is no depth in metres.
+        NoPartFound: Nothing rises above the table there, it is cut off, reaches too far beyond the region,
+            is not alone, or lies elsewhere; or the image is no depth in metres.
     """
     found = find_part_pixels(
         depth, intrinsics, T_base_camera,
@@ -304,13 +311,18 @@ def _largest_group(mask: np.ndarray, links: np.ndarray, reach: int) -> tuple[np.
     Pixels are of one group if discs of a diameter of ``reach`` pixels (1: neighbours) around them touch, or
     if ``links`` within twice as far, with their neighbours, connect them.
     """
-    pixels, between = mask.astype(np.uint8), cv2.dilate(links.astype(np.uint8), np.ones((3, 3), np.uint8))
+    pixels, between = mask.astype(np.uint8), _grown(links).view(np.uint8)
     discs, wide = (cv2.dilate(pixels, _disc(size)) for size in (reach, 2 * reach - 1))
     _, labels = cv2.connectedComponents(np.bitwise_or(discs, np.bitwise_and(wide, between)), connectivity=8)
     sizes = np.bincount(labels[mask], minlength=3)  # 0 is the background
     if sizes.max() < MIN_PIXELS:
         return None, 0
     return mask & (labels == int(np.argmax(sizes))), int(np.sort(sizes)[-2])
+
+
+def _grown(mask: np.ndarray) -> np.ndarray:
+    """A mask and the neighbours of its pixels."""
+    return cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 
 def _disc(diameter: int) -> np.ndarray:
