@@ -24,6 +24,9 @@ MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 QUIET = 0.0003
 """Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
+COARSE, COARSEST = 0.0002, 0.005
+"""Least and greatest step of depth that is coarse, metres: medians of noise of less than half a step are 0.
+Cameras deliver whole millimetres, for example; an image stored in 0.1 mm is exact."""
 LINK_DEVIATIONS = 4.0
 """A smoothed pixel rises by chance, at a Gaussian's tail, once in 30 000 by more."""
 MEAN_NOISE = 0.28
@@ -43,6 +46,7 @@ class FoundPart:
         heights: (h, w) above the measured table, metres, NaN where invalid; of a noisy image the median
             of 3 x 3 pixels, twice.
         table_offset: Measured height of the table relative to ``table_z``, metres; 0 in an exact image.
+        step: Step in which a noisy image's depth comes, metres; 0: it is not coarse.
         n_other: Number of pixels of the next largest group in the region.
     """
 
@@ -51,6 +55,7 @@ class FoundPart:
     points_base: np.ndarray
     heights: np.ndarray
     table_offset: float
+    step: float
     n_other: int
 
 
@@ -100,12 +105,12 @@ def find_part_pixels(
             "camera does not see it, or measures nothing there; check the region, the camera's pose, its "
             "range and its exposure"
         )
-    table_offset = 0.0
-    noise = _noise(heights, near)
+    table_offset, step = 0.0, _coarse_step(depth, near)
+    noise = _noise(heights, near, step)
     if noise > QUIET:
         min_height = max(min_height, noise)
         tops = _median(heights)
-        table_offset = _offset(tops[near], min_height)
+        table_offset = _offset(heights[near] if step else tops[near], min_height, step)
         if abs(table_offset) > min_height:
             raise NoPartFound(
                 f"the table is seen {1e3 * table_offset:+z.1f} mm from table_z {table_z:g}, at most "
@@ -137,8 +142,9 @@ def find_part_pixels(
             "what else is there"
         )
     return FoundPart(
-        depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other
-    )
+        depth=depth, mask=mask, points_base=points, heights=tops,
+        table_offset=table_offset, step=step, n_other=n_other,
+    )  # fmt: skip
 
 
 def _raised_group(
@@ -260,7 +266,27 @@ def _checked(depth: np.ndarray) -> np.ndarray:
     return depth if n_valid == depth.size else np.where(valid, depth, np.nan)
 
 
-def _noise(heights: np.ndarray, near: np.ndarray) -> float:
+def _coarse_step(depth: np.ndarray, near: np.ndarray) -> float:
+    """Find the step in which depth comes; 0 if it is not coarse, or no noise moves pixels by a step."""
+    changes, both = _steps(depth[::4], near[::4])
+    changed = changes[both & (changes > 0)]
+    step = float(changed.min(initial=np.inf))
+    if not COARSE < step < COARSEST:
+        return 0.0
+    n_steps = np.rint(changed / step)
+    # In an exact image only edges differ by a whole number of steps, by chance.
+    often = np.count_nonzero(n_steps == 1) > 0.02 * np.count_nonzero(both)
+    return step if often and np.abs(changed / step - n_steps).max() < 0.1 else 0.0
+
+
+def deviation_of_steps(offsets: np.ndarray, step: float) -> float:
+    """Estimate the standard deviation of offsets (n,) that come in steps, metres, without those of edges."""
+    sizes = np.abs(offsets)
+    kept = sizes[sizes <= 4 * max(step, 1.4826 * float(np.median(sizes)))]
+    return float(np.sqrt((kept**2).mean()))
+
+
+def _noise(heights: np.ndarray, near: np.ndarray, step: float) -> float:
     """Estimate the standard deviation of a pixel's noise from the steps between neighbours.
 
     Most of them are on the table. 0 if it is less than `QUIET`.
@@ -268,10 +294,14 @@ def _noise(heights: np.ndarray, near: np.ndarray) -> float:
     # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
     deviations = 0.6745 * math.sqrt(2)
     few, fewer = _steps(heights[::4], near[::4])
-    if 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
+    if not step and 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
         return 0.0  # far from half of them: a quarter of the rows suffices
     steps, both = _steps(heights, near)
-    noise = float(np.median(steps[both])) / deviations if both.any() else 0.0
+    if not both.any():
+        return 0.0
+    noise = float(np.median(steps[both])) / deviations
+    if step:  # rounding alone deviates by step / sqrt(12)
+        noise = max(deviation_of_steps(steps[both], step) / math.sqrt(2), step / math.sqrt(12))
     return noise if noise > QUIET else 0.0
 
 
@@ -289,10 +319,11 @@ def _median(heights: np.ndarray) -> np.ndarray:
     return np.where(seen, median, np.nan)
 
 
-def _offset(heights: np.ndarray, least: float) -> float:
+def _offset(heights: np.ndarray, least: float, step: float) -> float:
     """Estimate the table's height from heights (n,), most of which are the table's."""
     first = np.median(heights)
-    return float(np.median(heights[np.abs(heights - first) < least]))
+    table = heights[np.abs(heights - first) < least]
+    return float(table.mean() if step else np.median(table))
 
 
 def _mean(heights: np.ndarray, most: float) -> np.ndarray:

@@ -303,3 +303,13 @@ def test_depth_in_steps_of_a_tenth_of_a_millimetre_is_exact_for_a_tilted_camera_
     stepped = (depth * 1e4).round().astype(np.float32) * np.float32(1e-4)
     view = view_part(stepped, INTRINSICS, TILTED, table_z=0.0, region=REGION)
     assert view.table_offset == 0.0 and view.size[2] == pytest.approx(0.0025, abs=2e-4)
+
+
+@pytest.mark.parametrize("deviation", [0.0003, 0.0005, 0.001])
+@pytest.mark.parametrize("offset", [-0.0012, 0.0004])
+def test_the_table_is_measured_between_the_steps_of_depth_in_whole_millimetres(offset, deviation):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.02))])
+    stepped = np.round(noisy(depth - np.float32(offset), deviation), 3)
+    view = view_part(stepped, INTRINSICS, OVERHEAD, **FIND)
+    assert view.table_offset == pytest.approx(offset, abs=2e-4)
+    assert view.size == pytest.approx(synthetic.view(depth).size, abs=0.004)
