@@ -85,7 +85,7 @@ class Grid(Config):
     """Grid of slots."""
 
     first: tuple[_Coordinate, _Coordinate]
-    """x and y of the slot nearest to the base's origin, m."""
+    """Smallest x and y of a slot's centre, m."""
     pitch: tuple[_Length, _Length]
     """Distance between slots along x and y, m."""
     n: tuple[_Count, _Count]
