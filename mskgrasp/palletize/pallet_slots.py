@@ -27,6 +27,8 @@ SEEN_TOLERANCE = 0.003
 BESIDE = 0.05
 """Least distance of a slot's edge from the region in which parts are fed, m: placed parts must not reach into
 it."""
+_TOUCH = 1e-6
+"""Slots that overlap by less touch, m."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
@@ -134,7 +136,7 @@ def chosen_slots(config: PalletizeConfig) -> list[Slot]:
 
     Raises:
         BadConfig: The file cannot be read, or a value is not valid.
-        UsageError: The file holds no slot.
+        UsageError: The file holds no slot, or two that overlap.
     """
     if config.slots is not None:
         return read_slots(config.slots)
@@ -147,12 +149,28 @@ def read_slots(path: Path) -> list[Slot]:
 
     Raises:
         BadConfig: The file cannot be read, or a value is not valid.
-        UsageError: The file holds no slot.
+        UsageError: The file holds no slot, or two that overlap.
     """
     slots = read_config(SlotsFile, path).all_slots()
     if not slots:
         raise UsageError(f"{path} holds no slot; give a grid, or a list of slots such as {{x: 0.5, y: 0.05}}")
+    if pair := _overlapping(slots):
+        first, second = (f"{index + 1} at ({slots[index].x:g}, {slots[index].y:g}) m" for index in pair)
+        raise UsageError(f"{path}: slot {first} and slot {second} overlap; move one, or make them smaller")
     return slots
+
+
+def _overlapping(slots: Sequence[Slot]) -> tuple[int, int] | None:
+    """Find two slots that overlap, by index; those without a size are points."""
+    centres = np.array([[slot.x, slot.y] for slot in slots])
+    sizes = np.array([slot.size or (0.0, 0.0) for slot in slots])
+    for index in range(len(slots) - 1):
+        apart = np.abs(centres[index + 1 :] - centres[index])
+        least = np.maximum((sizes[index + 1 :] + sizes[index]) / 2 - _TOUCH, _TOUCH)
+        overlaps = np.flatnonzero((apart < least).all(axis=1))
+        if overlaps.size:
+            return index, index + 1 + int(overlaps[0])
+    return None
 
 
 def check_slots_in_reach(cell: Cell, slots: Sequence[Slot]) -> None:

@@ -118,6 +118,11 @@ def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():
         ("grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [3000, 2000]}", BadConfig, "less than or equal to"),
         ("grid: {first: [0.4, 0.2], pitch: [0.05, 0.05], n: [2, 2], size: [0.06, 0.04]}", BadConfig, "lap"),
         ("- {x: 0.5, y: 0.1}", BadConfig, "expected a mapping"),
+        ("slots: [{x: 0.5, y: 0.2}, {x: 0.4, y: 0.2}, {x: 0.5, y: 0.2}]", UsageError,
+         r"slot 1 at \(0.5, 0.2\) m and slot 3 at \(0.5, 0.2\) m overlap"),
+        ("{grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [3, 2]},"
+         " slots: [{x: 0.3, y: 0.2, size: [0.1, 0.1]}, {x: 0.64, y: 0.26, size: [0.1, 0.1]}]}", UsageError,
+         r"slot 3 at \(0.6, 0.2\) m and slot 8 at \(0.64, 0.26\) m overlap"),
     ],
 )  # fmt: skip
 def test_an_invalid_file_is_an_error_of_one_line(tmp_path, text, error, message):
