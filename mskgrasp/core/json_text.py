@@ -18,14 +18,29 @@ Four = Annotated[list[float], Field(min_length=4, max_length=4)]
 Seven = Annotated[list[float], Field(min_length=7, max_length=7)]
 
 
-def parse_json(text: str | bytes) -> Any:
-    """Parse JSON in which no object has a key twice.
+_MOST_DIGITS = 300
+"""Digits of an integer; any of so many is a float, too."""
+
+
+def parse_json(text: str | bytes, *, constants: bool = False) -> Any:
+    """Parse JSON in which no object has a key twice, and all numbers are finite.
+
+    Args:
+        text: The JSON.
+        constants: Accept NaN and the infinities, which JSON does not have but Python writes.
 
     Raises:
-        ValueError: It is not valid, has a key twice, or more brackets inside each other than can be read.
+        ValueError: It is not valid, has a key twice, a number that is not finite or too large for a float, or
+            more brackets inside each other than can be read.
     """
     try:
-        return json.loads(text, object_pairs_hook=_without_doubles)
+        return json.loads(
+            text,
+            object_pairs_hook=_without_doubles,
+            parse_float=_fraction,
+            parse_int=_integer,
+            parse_constant=float if constants else _no_number,
+        )
     except RecursionError as error:
         raise ValueError("too many brackets inside each other") from error
 
@@ -54,6 +69,27 @@ def _fields_of(kind: type) -> type[BaseModel]:
     hints = get_type_hints(kind, include_extras=True)
     wanted: dict[str, Any] = {field.name: (hints[field.name], ...) for field in fields(kind)}
     return create_model(kind.__name__, __config__=ConfigDict(strict=True), **wanted)
+
+
+def _fraction(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"{_start(text)} is too large")
+    return value
+
+
+def _integer(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        raise ValueError(f"{_start(text)} is too large")
+    return int(text)
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _start(text: str) -> str:
+    return text if len(text) <= 20 else f"{text[:20]}..."
 
 
 def _without_doubles(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:

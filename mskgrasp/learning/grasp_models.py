@@ -262,7 +262,7 @@ def read_meta(path: Path) -> ModelMeta:
         BadModel: It is damaged or of another schema.
     """
     try:
-        values = parse_json(read_bounded(path, MOST_BYTES))
+        values = parse_json(read_bounded(path, MOST_BYTES), constants=True)  # metrics may be NaN
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise BadModel(f"{path} is damaged ({reason}); copy it again or train again") from error

@@ -25,7 +25,10 @@ from mskgrasp.planning.place_pose import Target, check_place
 SEEN_TOLERANCE = 0.003
 """Error of a part's sides in a depth image, about a pixel, m."""
 BESIDE = 0.05
-"""Least distance of a slot from the region in which parts are fed, m: placed parts must not reach into it."""
+"""Least distance of a slot's edge from the region in which parts are fed, m: placed parts must not reach into
+it."""
+_TOUCH = 1e-6
+"""Slots that overlap by less touch, m."""
 _ANGLES = np.radians([-90.0, -45.0, 0.0, 45.0])
 
 
@@ -85,7 +88,7 @@ class Grid(Config):
     """Grid of slots."""
 
     first: tuple[_Coordinate, _Coordinate]
-    """x and y of the slot nearest to the base's origin, m."""
+    """Smallest x and y of a slot's centre, m."""
     pitch: tuple[_Length, _Length]
     """Distance between slots along x and y, m."""
     n: tuple[_Count, _Count]
@@ -133,7 +136,7 @@ def chosen_slots(config: PalletizeConfig) -> list[Slot]:
 
     Raises:
         BadConfig: The file cannot be read, or a value is not valid.
-        UsageError: The file holds no slot.
+        UsageError: The file holds no slot, or two that overlap.
     """
     if config.slots is not None:
         return read_slots(config.slots)
@@ -146,12 +149,28 @@ def read_slots(path: Path) -> list[Slot]:
 
     Raises:
         BadConfig: The file cannot be read, or a value is not valid.
-        UsageError: The file holds no slot.
+        UsageError: The file holds no slot, or two that overlap.
     """
     slots = read_config(SlotsFile, path).all_slots()
     if not slots:
         raise UsageError(f"{path} holds no slot; give a grid, or a list of slots such as {{x: 0.5, y: 0.05}}")
+    if pair := _overlapping(slots):
+        first, second = (f"{index + 1} at ({slots[index].x:g}, {slots[index].y:g}) m" for index in pair)
+        raise UsageError(f"{path}: slot {first} and slot {second} overlap; move one, or make them smaller")
     return slots
+
+
+def _overlapping(slots: Sequence[Slot]) -> tuple[int, int] | None:
+    """Find two slots that overlap, by index; those without a size are points."""
+    centres = np.array([[slot.x, slot.y] for slot in slots])
+    sizes = np.array([slot.size or (0.0, 0.0) for slot in slots])
+    for index in range(len(slots) - 1):
+        apart = np.abs(centres[index + 1 :] - centres[index])
+        least = np.maximum((sizes[index + 1 :] + sizes[index]) / 2 - _TOUCH, _TOUCH)
+        overlaps = np.flatnonzero((apart < least).all(axis=1))
+        if overlaps.size:
+            return index, index + 1 + int(overlaps[0])
+    return None
 
 
 def check_slots_in_reach(cell: Cell, slots: Sequence[Slot]) -> None:
@@ -177,16 +196,46 @@ def check_slots_beside_region(cell: Cell, slots: Sequence[Slot]) -> None:
     """Refuse slots where a placed part would be taken for the next one, or lie where that one is presented.
 
     Raises:
-        UsageError: A slot is nearer than `BESIDE` to the region in which parts are fed.
+        UsageError: The edge of a slot or, where it has no size, its centre is nearer than `BESIDE` to the
+            region in which parts are fed.
     """
-    x_min, x_max, y_min, y_max = cell.workspace.region
     for number, slot in enumerate(slots, 1):
-        beside = max(x_min - slot.x, 0, slot.x - x_max), max(y_min - slot.y, 0, slot.y - y_max)
-        if math.hypot(*beside) < BESIDE - 1e-9:
-            raise UsageError(
-                f"slot {number} at ({slot.x:g}, {slot.y:g}) m is nearer than {BESIDE:g} m to the region of "
-                f"the next part, x {x_min:g} to {x_max:g} m, y {y_min:g} to {y_max:g} m: move it"
-            )
+        if _distance(cell, slot, slot.size or (0.0, 0.0)) < BESIDE - 1e-9:
+            raise UsageError(f"slot {number} at ({slot.x:g}, {slot.y:g}) m {_too_near(cell)}")
+
+
+def check_parts_beside_region(cell: Cell, pairs: Iterable[tuple[Part, Slot]]) -> None:
+    """Refuse slots without a size as `check_slots_beside_region`, by the parts that are placed there.
+
+    Raises:
+        UsageError: A part in its most probable stable pose would be nearer than `BESIDE` to the region.
+    """
+    extents: dict[tuple[str, float], np.ndarray] = {}
+    for part, slot in pairs:
+        if slot.size is not None:
+            continue
+        if (part.name, slot.theta) not in extents:
+            extents[part.name, slot.theta] = usual_footprint(part).extent(slot.theta)
+        if _distance(cell, slot, extents[part.name, slot.theta]) < BESIDE - 1e-9:
+            raise UsageError(f"{part.name} in the slot at ({slot.x:g}, {slot.y:g}) m {_too_near(cell)}")
+
+
+def _distance(cell: Cell, slot: Slot, extent: Sequence[float] | np.ndarray) -> float:
+    """Compute the distance of a rectangle around a slot's centre from the region of the next part, metres."""
+    x_min, x_max, y_min, y_max = cell.workspace.region
+    along, across = extent[0] / 2, extent[1] / 2
+    return math.hypot(
+        max(x_min - slot.x - along, 0, slot.x - along - x_max),
+        max(y_min - slot.y - across, 0, slot.y - across - y_max),
+    )
+
+
+def _too_near(cell: Cell) -> str:
+    x_min, x_max, y_min, y_max = cell.workspace.region
+    return (
+        f"is nearer than {BESIDE:g} m to the region of the next part, x {x_min:g} to {x_max:g} m, "
+        f"y {y_min:g} to {y_max:g} m: move the slot"
+    )
 
 
 def first_reachable(cell: Cell, poses: Sequence[Grasp], *, tallest: float = 0.0) -> int:

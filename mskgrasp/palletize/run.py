@@ -18,6 +18,7 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.pallet_slots import (
     Slot,
+    check_parts_beside_region,
     check_room,
     check_slots_beside_region,
     check_slots_in_reach,
@@ -100,7 +101,10 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
             f"{len(untried)} of {len(names)} parts are not tried: {config.slots} has room for {len(slots)}, "
             f"and is filled {config.trials} times; raise --trials to try all"
         )
-    check_room((find_part(task.part), task.slot) for pallet in pallets for task in pallet)
+    pairs = [(find_part(task.part), task.slot) for pallet in pallets for task in pallet]
+    check_room(pairs)
+    if config.slots is not None:
+        check_parts_beside_region(cell_from_yaml(config.cell), pairs)
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)

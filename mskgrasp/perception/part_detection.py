@@ -24,6 +24,9 @@ MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
 QUIET = 0.0003
 """Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
+COARSE, COARSEST = 0.0002, 0.005
+"""Least and greatest step of depth that is coarse, metres: medians of noise of less than half a step are 0.
+Cameras deliver whole millimetres, for example; an image stored in 0.1 mm is exact."""
 LINK_DEVIATIONS = 4.0
 """A smoothed pixel rises by chance, at a Gaussian's tail, once in 30 000 by more."""
 MEAN_NOISE = 0.28
@@ -43,6 +46,7 @@ class FoundPart:
         heights: (h, w) above the measured table, metres, NaN where invalid; of a noisy image the median
             of 3 x 3 pixels, twice.
         table_offset: Measured height of the table relative to ``table_z``, metres; 0 in an exact image.
+        step: Step in which a noisy image's depth comes, metres; 0: it is not coarse.
         n_other: Number of pixels of the next largest group in the region.
     """
 
@@ -51,6 +55,7 @@ class FoundPart:
     points_base: np.ndarray
     heights: np.ndarray
     table_offset: float
+    step: float
     n_other: int
 
 
@@ -83,8 +88,9 @@ def find_part_pixels(
         part_height: Height of a known part as it lies flattest, metres; infinite: it is not known.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, a noisy camera measures the table more than
-            ``min_height`` from ``table_z``, or the image is no depth in metres.
+        NoPartFound: Nothing rises above the table there, no pixel there has a depth, a noisy camera measures
+            the table more than ``min_height`` from ``table_z``, the part reaches too far beyond the region,
+            or the image is no depth in metres.
     """
     depth = _checked(np.asarray(depth.cpu() if isinstance(depth, torch.Tensor) else depth))
     points = _points_base(depth, intrinsics, T_base_camera)
@@ -93,12 +99,18 @@ def find_part_pixels(
     x_min, x_max, y_min, y_max = region
     near = (x > x_min - REGION_MARGIN) & (x < x_max + REGION_MARGIN)
     near &= (y > y_min - REGION_MARGIN) & (y < y_max + REGION_MARGIN)
-    table_offset = 0.0
-    noise = _noise(heights, near)
+    if not near.any():
+        raise NoPartFound(
+            f"no pixel in the region has a depth (x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}): the "
+            "camera does not see it, or measures nothing there; check the region, the camera's pose, its "
+            "range and its exposure"
+        )
+    table_offset, step = 0.0, _coarse_step(depth, near)
+    noise = _noise(heights, near, step)
     if noise > QUIET:
         min_height = max(min_height, noise)
         tops = _median(heights)
-        table_offset = _offset(tops[near], min_height)
+        table_offset = _offset(heights[near] if step else tops[near], min_height, step)
         if abs(table_offset) > min_height:
             raise NoPartFound(
                 f"the table is seen {1e3 * table_offset:+z.1f} mm from table_z {table_z:g}, at most "
@@ -107,42 +119,49 @@ def find_part_pixels(
             )
         tops, heights = tops - table_offset, heights - table_offset
     raised, mask, n_other = _raised_group(heights, near, min_height, noise)
-    if _is_mostly_raised(raised, near):
+    if _share(raised, near) > MOST_RAISED:
         raise NoPartFound(
-            f"{raised.sum() / near.sum():.0%} of the region rise more than {min_height * 1e3:g} mm above the "
+            f"{_share(raised, near):.0%} of the region rise more than {min_height * 1e3:g} mm above the "
             f"table (median {np.median(tops[near]) * 1e3:.1f} mm): the table is tilted, or table_z "
             f"{table_z:g} or the camera's pose is wrong; calibrate the camera again"
         )
     half = max(part_height / 2, LINK_DEVIATIONS * MEAN_NOISE * noise)
     if mask is None and half < min_height:
         raised, mask, n_other = _raised_group(heights, near, half, noise)
-        mask = None if _is_mostly_raised(raised, near) else mask
+        mask = None if _share(raised, near) > MOST_RAISED else mask
     if mask is None:
-        highest = tops[near].max() if near.any() else np.nan
         raise NoPartFound(
             f"nothing rises more than {min_height * 1e3:g} mm above the table in the region (highest point "
-            f"{highest * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the camera's pose"
+            f"{tops[near].max() * 1e3:.1f} mm); put a part there, or check table_z {table_z:g} and the "
+            "camera's pose"
+        )
+    if (_grown(mask) & raised & ~near).any():
+        raise NoPartFound(
+            f"the part reaches more than {REGION_MARGIN * 100:g} cm beyond the region "
+            f"(x {x_min:g}..{x_max:g}, y {y_min:g}..{y_max:g}); move it towards the middle, or clear away "
+            "what else is there"
         )
     return FoundPart(
-        depth=depth, mask=mask, points_base=points, heights=tops, table_offset=table_offset, n_other=n_other
-    )
+        depth=depth, mask=mask, points_base=points, heights=tops,
+        table_offset=table_offset, step=step, n_other=n_other,
+    )  # fmt: skip
 
 
 def _raised_group(
     heights: np.ndarray, near: np.ndarray, least: float, noise: float
 ) -> tuple[np.ndarray, np.ndarray | None, int]:
-    """Find the pixels higher than ``least``, their largest group, and the size of the second largest."""
+    """Find the pixels higher than ``least``, their largest group nearby, and the second largest's size."""
     reach, link_height = 1, least
     if noise > QUIET:
         reach, heights = 5, _mean(heights, 2 * least)
         link_height = min(least, max(least / 2, LINK_DEVIATIONS * MEAN_NOISE * noise))
-    raised = near & (heights > least)
-    return raised, *_largest_group(raised, near & (heights > link_height), reach)
+    raised = heights > least
+    return raised, *_largest_group(raised & near, near & (heights > link_height), reach)
 
 
-def _is_mostly_raised(raised: np.ndarray, near: np.ndarray) -> bool:
-    """Whether more of the region is raised than a part may cover."""
-    return bool(raised.sum() > MOST_RAISED * max(near.sum(), 1))
+def _share(raised: np.ndarray, near: np.ndarray) -> float:
+    """Compute the share of the pixels nearby that are raised."""
+    return np.count_nonzero(raised & near) / np.count_nonzero(near)
 
 
 def view_part(
@@ -173,8 +192,8 @@ def view_part(
         alone: Refuse a second part; in a noisy image one that is more than four pixels away.
 
     Raises:
-        NoPartFound: Nothing rises above the table there, it is cut off, not alone, or lies elsewhere; or
-            the image is no depth in metres.
+        NoPartFound: Nothing rises above the table there, it is cut off, reaches too far beyond the region,
+            is not alone, or lies elsewhere; or the image is no depth in metres.
     """
     found = find_part_pixels(
         depth, intrinsics, T_base_camera,
@@ -247,7 +266,27 @@ def _checked(depth: np.ndarray) -> np.ndarray:
     return depth if n_valid == depth.size else np.where(valid, depth, np.nan)
 
 
-def _noise(heights: np.ndarray, near: np.ndarray) -> float:
+def _coarse_step(depth: np.ndarray, near: np.ndarray) -> float:
+    """Find the step in which depth comes; 0 if it is not coarse, or no noise moves pixels by a step."""
+    changes, both = _steps(depth[::4], near[::4])
+    changed = changes[both & (changes > 0)]
+    step = float(changed.min(initial=np.inf))
+    if not COARSE < step < COARSEST:
+        return 0.0
+    n_steps = np.rint(changed / step)
+    # In an exact image only edges differ by a whole number of steps, by chance.
+    often = np.count_nonzero(n_steps == 1) > 0.02 * np.count_nonzero(both)
+    return step if often and np.abs(changed / step - n_steps).max() < 0.1 else 0.0
+
+
+def deviation_of_steps(offsets: np.ndarray, step: float) -> float:
+    """Estimate the standard deviation of offsets (n,) that come in steps, metres, without those of edges."""
+    sizes = np.abs(offsets)
+    kept = sizes[sizes <= 4 * max(step, 1.4826 * float(np.median(sizes)))]
+    return float(np.sqrt((kept**2).mean()))
+
+
+def _noise(heights: np.ndarray, near: np.ndarray, step: float) -> float:
     """Estimate the standard deviation of a pixel's noise from the steps between neighbours.
 
     Most of them are on the table. 0 if it is less than `QUIET`.
@@ -255,10 +294,14 @@ def _noise(heights: np.ndarray, near: np.ndarray) -> float:
     # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
     deviations = 0.6745 * math.sqrt(2)
     few, fewer = _steps(heights[::4], near[::4])
-    if 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
+    if not step and 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
         return 0.0  # far from half of them: a quarter of the rows suffices
     steps, both = _steps(heights, near)
-    noise = float(np.median(steps[both])) / deviations if both.any() else 0.0
+    if not both.any():
+        return 0.0
+    noise = float(np.median(steps[both])) / deviations
+    if step:  # rounding alone deviates by step / sqrt(12)
+        noise = max(deviation_of_steps(steps[both], step) / math.sqrt(2), step / math.sqrt(12))
     return noise if noise > QUIET else 0.0
 
 
@@ -276,10 +319,11 @@ def _median(heights: np.ndarray) -> np.ndarray:
     return np.where(seen, median, np.nan)
 
 
-def _offset(heights: np.ndarray, least: float) -> float:
+def _offset(heights: np.ndarray, least: float, step: float) -> float:
     """Estimate the table's height from heights (n,), most of which are the table's."""
     first = np.median(heights)
-    return float(np.median(heights[np.abs(heights - first) < least]))
+    table = heights[np.abs(heights - first) < least]
+    return float(table.mean() if step else np.median(table))
 
 
 def _mean(heights: np.ndarray, most: float) -> np.ndarray:
@@ -298,13 +342,18 @@ def _largest_group(mask: np.ndarray, links: np.ndarray, reach: int) -> tuple[np.
     Pixels are of one group if discs of a diameter of ``reach`` pixels (1: neighbours) around them touch, or
     if ``links`` within twice as far, with their neighbours, connect them.
     """
-    pixels, between = mask.astype(np.uint8), cv2.dilate(links.astype(np.uint8), np.ones((3, 3), np.uint8))
+    pixels, between = mask.astype(np.uint8), _grown(links).view(np.uint8)
     discs, wide = (cv2.dilate(pixels, _disc(size)) for size in (reach, 2 * reach - 1))
     _, labels = cv2.connectedComponents(np.bitwise_or(discs, np.bitwise_and(wide, between)), connectivity=8)
     sizes = np.bincount(labels[mask], minlength=3)  # 0 is the background
     if sizes.max() < MIN_PIXELS:
         return None, 0
     return mask & (labels == int(np.argmax(sizes))), int(np.sort(sizes)[-2])
+
+
+def _grown(mask: np.ndarray) -> np.ndarray:
+    """A mask and the neighbours of its pixels."""
+    return cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 
 def _disc(diameter: int) -> np.ndarray:

@@ -35,6 +35,8 @@ FILE = "grasps.json"
 SIMULATED_ALIKE = np.diag(np.square([5e-5, 5e-5, 5e-5, np.radians(0.1)]))
 """Covariance, metres and radians, to be added to that of a certified grasp: outcomes of the simulation itself
 differ by so much if the part is moved by 10 um (docs/results/validation.md), where the repeats may not."""
+_ROUNDING = 1e-9
+"""Share of a covariance's greatest element that rounding may add."""
 _LEAST_SPREAD = 1e-12
 """Smaller spreads are alike: (1 um)^2."""
 
@@ -238,10 +240,11 @@ def read_certified(part: Part, folder: Path | None = None) -> CertifiedGrasps:
             grasps=grasps,
             uncertified=uncertified,
             without={int(number): str(reason) for number, reason in values["without"].items()},
-            like={int(number): (int(other), float(turn)) for number, (other, turn) in values["like"].items()},
-            stands=tuple(map(bool, values["stands"])),
+            like={int(number): (other, float(turn)) for number, (other, turn) in values["like"].items()},
+            stands=tuple(values["stands"]),
             conditions=dict(values["conditions"]),
         )
+        _check_values(found)
         n_resting = len(part.resting_probability)
         numbers = {*found.without, *found.like, *(other for other, _ in found.like.values())}
         if len(found.stands) != n_resting or not numbers <= set(range(n_resting)):
@@ -268,13 +271,31 @@ def grasp_from_json(values: dict[str, Any], n_resting: int) -> CertifiedGrasp:
     for name, array in arrays.items():
         if array.shape != _SHAPES[name] or not np.isfinite(array).all():
             raise ValueError(f"{name} must be finite and of shape {_SHAPES[name]}")
-    counts: dict[str, Any] = {name: int(values[name]) for name in ("resting", "n", "lifted")}
+    for name in ("residual", "swing_cov"):
+        covariance = arrays[name]
+        rounding = _ROUNDING * float(np.abs(covariance).max())
+        symmetric = np.abs(covariance - covariance.T).max() <= rounding
+        if not symmetric or np.linalg.eigvalsh(covariance)[0] < -rounding:
+            raise ValueError(f"{name} is no covariance")
+    counts: dict[str, Any] = {name: values[name] for name in ("resting", "n", "lifted")}
     spread_error = float(values["spread_error"])
     if not 0 <= spread_error < np.inf:
         raise ValueError("spread_error must be finite and not negative")
-    if not (0 <= counts["resting"] < n_resting and 0 <= counts["lifted"] <= counts["n"]):
+    if not all(type(count) is int for count in counts.values()):
+        raise ValueError("resting, lifted and n must be integers")
+    if not (0 <= counts["resting"] < n_resting and 0 <= counts["lifted"] <= counts["n"] > 0):
         raise ValueError("resting, lifted or n is out of range")
     return CertifiedGrasp(**arrays, **counts, spread_error=spread_error)
+
+
+def _check_values(found: CertifiedGrasps) -> None:
+    if not all(type(other) is int and np.isfinite(turn) for other, turn in found.like.values()):
+        raise ValueError("like must hold indices and finite turns")
+    if not all(isinstance(one, bool) for one in found.stands):
+        raise ValueError("stands must be true or false")
+    errors = found.conditions["pose_errors"]
+    if not all(0 <= float(errors[name]) < np.inf for name in ("position", "turn")):
+        raise ValueError("pose_errors must be finite and not negative")
 
 
 def rest_frame(T_base_obj: Pose, quat_table_obj: np.ndarray) -> Pose:

@@ -335,6 +335,6 @@ def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, v
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
-    """Select one of the shortlisted grasps, which are sorted by quality; the first has the least quality."""
+    """Select one of the shortlisted grasps, best quality first, of those with at least ``least_quality``."""
     good = np.flatnonzero(qualities >= config.least_quality)
     return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])

@@ -52,8 +52,9 @@ class Scene:
 
     @classmethod
     def of(cls, frame: RgbdFrame, view: PartView, table_z: float, device: torch.device) -> Scene:
-        """Make the scene of a frame."""
-        depth = torch.as_tensor(np.asarray(frame.depth, dtype=np.float32), device=device)
+        """Make the scene of a frame; depth that is not finite is invalid."""
+        known = np.asarray(frame.depth, dtype=np.float32)
+        depth = torch.as_tensor(np.where(np.isfinite(known), known, np.float32(np.nan)), device=device)
         return cls(
             heights=height_image(depth, frame.intrinsics, frame.T_base_camera, table_z + view.table_offset),
             intrinsics=frame.intrinsics,

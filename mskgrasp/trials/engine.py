@@ -84,7 +84,8 @@ class ExecutedGrasp:
 
     Attributes:
         reason: Reason why the part was not lifted and held; empty where it was.
-        result: Measurements of the arm; None where it refused the grasp before moving.
+        result: Measurements of the arm; None where a pose or the way to one is outside its workspace, before
+            anything moved or later (`hal.execute_grasp`).
         before: ``T_base_obj`` before the grasp; None without a tracker.
         displacement: (4,) object displacement; None where the grasp failed or without a tracker.
         swing: (2,) swing of the part in the hand, radians about x and y of the grasp frame; None as before.

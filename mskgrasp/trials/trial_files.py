@@ -74,7 +74,7 @@ def read_trial(path: Path) -> tuple[RgbdFrame, GraspPlan | None, RgbdFrame | Non
         return _frame("before", arrays), plan, after
     except FileNotFoundError as error:
         raise BadDataset(f"no {path}: the trial's file was removed; run it again in another --out") from error
-    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, OverflowError) as error:
         raise BadDataset(f"{path} is damaged ({' '.join(str(error).split())}); copy it again") from error
 
 

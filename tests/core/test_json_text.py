@@ -29,12 +29,23 @@ def test_numbers_that_json_does_not_have_become_null():
         ("{", "Expecting property name"),
         (b"\xff\xff", "decode"),
         ("", "Expecting value"),
+        ("[1, NaN]", "NaN is no number of JSON"),
+        ('{"a": -Infinity}', "-Infinity is no number of JSON"),
+        ("1e400", "1e400 is too large"),
+        ("[-1" + "0" * 400 + "]", r"-10{18}\.\.\. is too large"),
+        ("1" * 5000, r"1{20}\.\.\. is too large"),
     ],
 )
 def test_what_cannot_be_used_is_a_value_error_of_one_line(text: str | bytes, problem: str):
     with pytest.raises(ValueError, match=problem) as raised:
         parse_json(text)
     assert "\n" not in str(raised.value)
+
+
+def test_numbers_of_every_legal_size_are_read_and_constants_where_they_are_accepted():
+    assert parse_json("[18446744073709551615, -1e308, 5e-324, 1e-400]") == [2**64 - 1, -1e308, 5e-324, 0.0]
+    values = parse_json("[NaN, Infinity, -Infinity]", constants=True)
+    assert math.isnan(values[0]) and values[1:] == [math.inf, -math.inf]
 
 
 def test_a_key_that_occurs_twice_is_found_among_many_in_no_time():

@@ -2,6 +2,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
@@ -65,6 +66,12 @@ def test_damaged_files_are_reported(folder):
     assert "damaged" in complaint(folder)
     (folder / "model.json").write_text("{")
     assert "damaged" in complaint(folder)
+
+
+def test_a_description_with_a_metric_that_is_not_known_is_read(folder):
+    """NaN, where no grasp of the validation parts succeeded."""
+    change_description(folder, lambda values: values["metrics"].update(auroc=float("nan")))
+    assert np.isnan(load_models(folder).meta.metrics["auroc"])
 
 
 def test_weights_that_are_not_finite_are_reported_and_never_saved(folder):

@@ -13,6 +13,7 @@ from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.pallet_slots import (
     Slot,
+    check_parts_beside_region,
     check_room,
     check_slots_beside_region,
     check_slots_in_reach,
@@ -69,6 +70,26 @@ def test_a_slot_that_reaches_into_the_region_of_the_next_part_is_named():
             check_slots_beside_region(cell, [beside, Slot(x=x, y=y, theta=0.0)])
 
 
+def test_a_slots_edge_is_what_is_kept_away_from_the_region_of_the_next_part():
+    """A part that fills the slot would be detected beside every following one."""
+    cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
+    _, x_max, _, y_max = cell.workspace.region
+    check_slots_beside_region(cell, [Slot(x=0.5, y=y_max + 0.1, theta=0.0, size=(0.2, 0.1))])
+    for x, y in ((0.5, y_max + 0.099), (x_max + 0.12, y_max + 0.07)):
+        with pytest.raises(UsageError, match=r"slot 1 at .* is nearer than 0.05 m to the region"):
+            check_slots_beside_region(cell, [Slot(x=x, y=y, theta=0.0, size=(0.2, 0.1))])
+
+
+def test_a_slot_without_a_size_is_as_large_as_the_part_that_is_placed_there():
+    cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
+    part = find_part("hex_bolt_m12x60")  # about 68 x 20 mm
+    y = cell.workspace.region[3] + 0.07
+    check_parts_beside_region(cell, [(part, Slot(x=0.5, y=y, theta=0.0))])
+    for slot in (Slot(x=0.5, y=y, theta=np.pi / 2), Slot(x=0.5, y=y - 0.015, theta=0.0)):
+        with pytest.raises(UsageError, match=r"hex_bolt_m12x60 in the slot at .* is nearer than 0.05 m"):
+            check_parts_beside_region(cell, [(part, slot)])
+
+
 def test_a_slot_out_of_reach_is_named():
     cell = cell_from_yaml(REPOSITORY / "configs" / "cells" / "sapien.yaml")
     with pytest.raises(UsageError, match=r"slot 2 at \(0.9, 0\) m .*outside the workspace"):
@@ -97,6 +118,11 @@ def test_a_slot_smaller_than_a_part_is_named_with_both_sizes():
         ("grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [3000, 2000]}", BadConfig, "less than or equal to"),
         ("grid: {first: [0.4, 0.2], pitch: [0.05, 0.05], n: [2, 2], size: [0.06, 0.04]}", BadConfig, "lap"),
         ("- {x: 0.5, y: 0.1}", BadConfig, "expected a mapping"),
+        ("slots: [{x: 0.5, y: 0.2}, {x: 0.4, y: 0.2}, {x: 0.5, y: 0.2}]", UsageError,
+         r"slot 1 at \(0.5, 0.2\) m and slot 3 at \(0.5, 0.2\) m overlap"),
+        ("{grid: {first: [0.4, 0.2], pitch: [0.1, 0.1], n: [3, 2]},"
+         " slots: [{x: 0.3, y: 0.2, size: [0.1, 0.1]}, {x: 0.64, y: 0.26, size: [0.1, 0.1]}]}", UsageError,
+         r"slot 3 at \(0.6, 0.2\) m and slot 8 at \(0.64, 0.26\) m overlap"),
     ],
 )  # fmt: skip
 def test_an_invalid_file_is_an_error_of_one_line(tmp_path, text, error, message):

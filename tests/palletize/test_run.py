@@ -101,6 +101,7 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
         (dict(models=Path("no/model")), BadModel, "no/model"),
         (dict(slots="small.yaml"), UsageError, rf"slot of 20 x 30 mm is smaller than {PART} \(28 x 28 mm\)"),
         (dict(slots="within.yaml"), UsageError, r"slot 1 at \(0.5, 0\) m is nearer than 0.05 m to"),
+        (dict(slots="beside.yaml"), UsageError, rf"{PART} in the slot at \(0.5, 0.175\) m is nearer than"),
         (dict(cell="mujoco.yaml", tape=(0.012, 0.008)), UsageError, "mujoco.yaml draws no tape on parts"),
         (dict(slots="none.yaml", parts=("no_such_part",)), UsageError, "cannot read .*none.yaml"),
         (dict(cell="none.yaml", parts=("no_such_part",)), UsageError, "cannot read .*none.yaml"),
@@ -112,6 +113,7 @@ def test_a_run_whose_cell_was_lost_is_resumed_and_reported(tmp_path, monkeypatch
 def test_an_impossible_run_is_refused_before_anything_moves(tmp_path, monkeypatch, changes, error, message):
     (tmp_path / "small.yaml").write_text("slots: [{x: 0.5, y: 0.2, size: [0.02, 0.03]}]")
     (tmp_path / "within.yaml").write_text("slots: [{x: 0.5, y: 0.0}]")
+    (tmp_path / "beside.yaml").write_text("slots: [{x: 0.5, y: 0.175}]")
     (tmp_path / "mujoco.yaml").write_text("type: mujoco")
     (tmp_path / "real.yaml").write_text(yaml.safe_dump(REAL))
     monkeypatch.setattr("sys.stdin", io.StringIO())

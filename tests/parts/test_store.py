@@ -76,6 +76,7 @@ def test_a_truncated_file_is_refused_when_loaded_and_rebuilt(file_name):
     [
         ("mass", -1.0),
         ("mass", "heavy"),
+        ("mass", 10**400),
         ("hull_error", float("nan")),
         ("inertia", [[1, 2], [3, 4]]),
         ("resting_probability", []),

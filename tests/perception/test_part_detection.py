@@ -99,6 +99,41 @@ def test_pixels_without_a_depth_are_left_out(nothing):
     assert synthetic.view(partly).size == pytest.approx(synthetic.view(depth).size)
 
 
+WIDE = np.array([[365.5, 0.0, 119.5], [0.0, 365.5, 119.5], [0.0, 0.0, 1.0]])
+
+
+def wide_view(boxes, seed=None):
+    """What a camera that sees 52 cm of the table detects."""
+    depth = render(boxes, intrinsics=WIDE, shape=(240, 240))
+    if seed is not None:
+        depth = add_noise(depth, WIDE, SensorNoise(model="kinect2"), np.random.default_rng(seed))
+    return view_part(depth, WIDE, OVERHEAD, table_z=TABLE_Z, region=REGION, min_height=0.003)
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+def test_a_part_of_which_a_piece_lies_too_far_out_is_refused(seed):
+    """Up to 17 mm of it were cut off, and its centre was 8 mm wrong."""
+    for x, y, yaw in ((0.56, 0.0, 0.0), (0.455, -0.107, np.pi / 2)):
+        with pytest.raises(NoPartFound, match="reaches more than 5 cm beyond the region"):
+            wide_view([Box(x=x, y=y, yaw=yaw, size=(0.15, 0.03, 0.03))], seed)
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+def test_a_part_that_reaches_no_farther_is_seen_whole_whatever_stands_farther_out(seed):
+    part = Box(x=0.54, y=0.0, yaw=0.0, size=(0.15, 0.03, 0.03))  # up to 4 cm beyond
+    wall = Box(x=0.65, y=0.0, yaw=0.0, size=(0.03, 0.2, 0.05))  # from 6 cm
+    view = wide_view([part, wall], seed)
+    assert np.abs(view.centre_base - part.T_base_obj.position)[:2].max() < 3 * PIXEL
+
+
+def test_a_region_without_a_depth_is_reported_as_such():
+    depth = render([Box(x=0.455, y=0.0, yaw=0.0, size=(0.06, 0.03, 0.03))])
+    hole = np.where(np.pad(np.ones((156, 156), bool), 2), np.float32(np.nan), depth)
+    for image, region in ((depth, (2.0, 2.2, 0.0, 0.2)), (hole, REGION)):
+        with pytest.raises(NoPartFound, match=r"no pixel in the region has a depth \(x "):
+            view_part(image, INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=region)
+
+
 def noisy_view(depth, model, seed, min_height=0.003, **known):
     noisy = add_noise(depth, INTRINSICS, SensorNoise(model=model), np.random.default_rng(seed))
     return view_part(
@@ -268,3 +303,13 @@ def test_depth_in_steps_of_a_tenth_of_a_millimetre_is_exact_for_a_tilted_camera_
     stepped = (depth * 1e4).round().astype(np.float32) * np.float32(1e-4)
     view = view_part(stepped, INTRINSICS, TILTED, table_z=0.0, region=REGION)
     assert view.table_offset == 0.0 and view.size[2] == pytest.approx(0.0025, abs=2e-4)
+
+
+@pytest.mark.parametrize("deviation", [0.0003, 0.0005, 0.001])
+@pytest.mark.parametrize("offset", [-0.0012, 0.0004])
+def test_the_table_is_measured_between_the_steps_of_depth_in_whole_millimetres(offset, deviation):
+    depth = render([Box(x=0.455, y=0.0, yaw=0.4, size=(0.06, 0.04, 0.02))])
+    stepped = np.round(noisy(depth - np.float32(offset), deviation), 3)
+    view = view_part(stepped, INTRINSICS, OVERHEAD, **FIND)
+    assert view.table_offset == pytest.approx(offset, abs=2e-4)
+    assert view.size == pytest.approx(synthetic.view(depth).size, abs=0.004)

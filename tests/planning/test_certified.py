@@ -135,6 +135,15 @@ def test_the_file_gives_back_what_was_written(tmp_path):
         (dict(grasps=7), "is damaged"),
         (dict(stands=[True]), r"is damaged \(the part has \d+ resting poses\)"),
         (dict(like={"1": [99, 0.0]}), r"is damaged \(the part has \d+ resting poses\)"),
+        (dict(like={"1": [0, "nan"]}), r"is damaged \(like must hold indices and finite turns\)"),
+        (dict(like={"1": [0.5, 0.0]}), r"is damaged \(like must hold indices and finite turns\)"),
+        (dict(like={"1": [0, 10**400]}), r"is damaged \(1.* is too large\)"),
+        (dict(stands="t" * len(PART.resting_probability)), r"is damaged \(stands must be true or false\)"),
+        (dict(conditions={}), r"is damaged \('pose_errors'\)"),
+        (
+            dict(conditions=dict(pose_errors=dict(position=-1.0, turn=0.0))),
+            r"is damaged \(pose_errors must be",
+        ),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused_in_a_line(tmp_path, change, message):
@@ -152,8 +161,31 @@ def test_a_value_that_is_no_number_is_refused(tmp_path, value):
     values = json.loads((tmp_path / FILE).read_text())
     values["grasps"][0]["mean"][2] = value
     (tmp_path / FILE).write_text(json.dumps(values))
+    with pytest.raises(BadPart, match=r"is damaged \((NaN|Infinity) is no number of JSON\)"):
+        read_certified(PART, tmp_path)
+    values["grasps"][0]["mean"][2] = str(value)
+    (tmp_path / FILE).write_text(json.dumps(values))
     with pytest.raises(BadPart, match="mean must be finite"):
         read_certified(PART, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (dict(residual=(-1e-8 * np.eye(4)).tolist()), "residual is no covariance"),
+        (dict(swing_cov=[[1e-6, 1e-6], [0.0, 1e-6]]), "swing_cov is no covariance"),
+        (dict(resting=0.5), "resting, lifted and n must be integers"),
+        (dict(n=0, lifted=0), "resting, lifted or n is out of range"),
+    ],
+)
+def test_a_grasp_whose_values_cannot_be_is_refused_in_a_line(tmp_path, change, message):
+    certified(certified_grasp()).write(tmp_path)
+    values = json.loads((tmp_path / FILE).read_text())
+    values["grasps"][0] |= change
+    (tmp_path / FILE).write_text(json.dumps(values))
+    with pytest.raises(BadPart, match=message) as caught:
+        read_certified(PART, tmp_path)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_part_without_certified_grasps_is_told_how_to_get_them(tmp_path):

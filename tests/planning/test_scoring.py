@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -25,6 +27,24 @@ def test_the_quality_network_sees_every_second_pixel_of_the_middle_of_the_same_p
     whole, coarse = scene.crop(grasps, network), scene.crop_for_quality(grasps, network)
     assert whole.shape == (1, 1, 33, 33) and coarse.shape == (1, 1, 17, 9)
     assert torch.allclose(whole[..., ::2, 8:25:2], coarse, atol=1e-6)
+
+
+@pytest.mark.parametrize("nothing", [np.inf, -np.inf])
+def test_infinite_depth_is_as_unknown_as_nan(nothing):
+    network = HandNetworkConfig(patch_pixels=33, patch_side=0.066)
+    frame = synthetic.frame([synthetic.Box(x=0.45, y=0.02, yaw=0.4, size=(0.07, 0.02, 0.03))])
+    hole = np.zeros(frame.depth.shape, bool)
+    hole[70:80, 60:100] = True
+    scenes = []
+    for value in (nothing, np.nan):
+        holed = replace(frame, depth=np.where(hole, np.float32(value), frame.depth))
+        view = view_part(
+            holed.depth, holed.intrinsics, holed.T_base_camera, table_z=0.0, region=synthetic.REGION
+        )
+        scenes.append(Scene.of(holed, view, 0.0, torch.device("cpu")))
+    grasps = np.array([[0.46, 0.01, 0.02, 0.3]])
+    infinite, unknown = (scene.crop(grasps, network) for scene in scenes)
+    assert torch.isfinite(infinite).all() and torch.equal(infinite, unknown)
 
 
 def test_a_network_that_sees_the_part_is_reported_the_angle():

@@ -189,6 +189,9 @@ def test_a_line_that_is_no_trial_is_named(tmp_path: Path):
     path.write_text('{"number": 0}\nnonsense\n')
     with pytest.raises(BadDataset, match="line 2 is not a trial"):
         read_trials(path, dict)
+    path.write_text(f'{{"number": 0}}\n{{"measured": [{10**400}]}}\n')
+    with pytest.raises(BadDataset, match="line 2 is not a trial"):
+        read_trials(path, lambda values: [float(one) for one in values.get("measured", [])])
 
 
 def test_a_digest_is_of_the_content_and_a_missing_file_is_an_error(tmp_path: Path):

@@ -112,3 +112,10 @@ def test_a_damaged_file_is_an_error_of_one_line(tmp_path: Path, content: bytes):
     with pytest.raises(BadDataset, match="a-000.npz is damaged") as raised:
         read_trial(path)
     assert "\n" not in str(raised.value)
+
+
+def test_a_schema_version_that_is_infinite_is_an_error_of_one_line(tmp_path: Path):
+    path = tmp_path / "a-000.npz"
+    np.savez(path, schema_version=np.inf)
+    with pytest.raises(BadDataset, match="a-000.npz is damaged"):
+        read_trial(path)

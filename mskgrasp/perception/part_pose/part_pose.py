@@ -11,7 +11,7 @@ from scipy.special import ndtr
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import PartNotRecognised
 from mskgrasp.core.geometry import Pose
-from mskgrasp.perception.part_detection import FoundPart, find_part_pixels
+from mskgrasp.perception.part_detection import FoundPart, deviation_of_steps, find_part_pixels
 from mskgrasp.perception.part_pose.known_part import KnownPart
 from mskgrasp.perception.part_pose.likelihood import Seen
 from mskgrasp.perception.part_pose.mismatch import Mismatch, reason_to_refuse
@@ -127,7 +127,7 @@ def find_part_pose(
 
 def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) -> Seen:
     """The pixels of a detected part and around it, above the table as measured there."""
-    noisy = found.table_offset != 0
+    noisy = found.table_offset != 0 or found.step > 0
     position = np.asarray(frame.T_base_camera.position, dtype=float)
     pitch = float(np.median(found.depth[found.mask])) / float(frame.intrinsics[0][0])
     rows, columns = np.flatnonzero(found.mask.any(axis=1)), np.flatnonzero(found.mask.any(axis=0))
@@ -144,8 +144,7 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
     near = valid & _grown(mask, border)
     beside = near & ~_grown(mask, 2)
     table = points[2][beside]
-    offset = float(np.median(table)) if len(table) else 0.0
-    noise = 1.4826 * float(np.median(np.abs(table - offset))) if len(table) else 0.0
+    offset, noise = _middle_and_noise(table, found.step) if len(table) else (0.0, 0.0)
     smoothed = noise > EXACT and _correlation(np.where(beside, points[2] - offset, np.nan), noise) > SMOOTHED
     x, y = points[0][mask], points[1][mask]
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
@@ -167,6 +166,15 @@ def see(found: FoundPart, frame: RgbdFrame, known: KnownPart, table_z: float) ->
     )
 
 
+def _middle_and_noise(table: np.ndarray, step: float) -> tuple[float, float]:
+    """Middle and standard deviation of heights (n,) around a part, metres; ``step`` as in `FoundPart`."""
+    middle = float(np.median(table))
+    if not step:
+        return middle, 1.4826 * float(np.median(np.abs(table - middle)))
+    middle = float(table[np.abs(table - middle) <= 4 * step].mean())
+    return middle, max(deviation_of_steps(table - middle, step), step / np.sqrt(12))
+
+
 def _correlation(heights: np.ndarray, noise: float) -> float:
     """Correlation of neighbouring heights (h, w) of the table, NaN where there is none; 0 if there are few.
 
@@ -179,7 +187,7 @@ def _correlation(heights: np.ndarray, noise: float) -> float:
     known = np.isfinite(products)
     if np.count_nonzero(known) < FEWEST_PAIRS:
         return 0.0
-    return float(products[known].mean() / np.nanmean(clipped**2))
+    return float(products[known].mean() / max(float(np.nanmean(clipped**2)), 1e-12))
 
 
 def _grown(mask: np.ndarray, reach: int) -> np.ndarray:

@@ -71,6 +71,17 @@ def test_a_wire_that_is_as_high_as_the_noise_of_a_kinect_is_found(mujoco_cell, s
     assert angle < np.radians(1.5)
 
 
+@pytest.mark.parametrize("noise", [0.0003, 0.0005, 0.0007])
+def test_a_part_is_found_in_depth_of_whole_millimetres(mujoco_cell, noise):
+    """Of most pixels the noise is rounded to none."""
+    true = resting_at("l_bracket_60x40", 0, 0.47, 0.03, 0.7)
+    frame = posed(mujoco_cell, "l_bracket_60x40", true)
+    noisy = frame.depth + np.random.default_rng(0).normal(0.0, noise, frame.depth.shape)
+    rounded = replace(frame, depth=np.round(noisy, 3).astype(np.float32))
+    distance, angle = nearest_symmetric(find(mujoco_cell, rounded, "l_bracket_60x40"), true)
+    assert distance < 0.5e-3 and angle < np.radians(1.0)
+
+
 @pytest.mark.parametrize("resting", range(4))
 def test_every_resting_pose_of_a_bracket_is_distinguished(mujoco_cell, resting):
     true = resting_at("l_bracket_60x40", resting, 0.55, 0.06, -1.0)
