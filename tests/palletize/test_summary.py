@@ -27,7 +27,7 @@ def test_medians_and_ratios_are_those_of_the_errors():
     assert summary.parts["b"].median_translation == pytest.approx(
         {"none": 6e-3, "predicted": 3e-3, "truth": 2e-4}
     )
-    assert "0.33" in gain_lines(summary)[1] and gain_lines(summary)[1].endswith(": met.")
+    assert "0.33" in gain_lines(summary)[1] and gain_lines(summary)[1].endswith(": not met.")
 
 
 def test_a_part_lost_under_one_correction_counts_under_none():
