@@ -27,12 +27,14 @@ MAX_RMS_PX = 1.5
 MAX_SCALE_ERROR = 0.015
 """Greatest relative error of the size of the squares; more means another board."""
 MAX_HALF_M = 0.005
-"""Greatest distance of the board by two calibrations from half the views each, metres; usual are 0.5 mm."""
+"""Greatest distance of the board by two calibrations from half the views each, metres; of 24 views usually
+0.5 mm."""
 _SLIPPED = (
-    "the board slipped or was loose: fix it so that it cannot move in the hand, and take the pictures again"
+    "the board probably slipped or was loose: fix it so that it cannot move in the hand, and take the "
+    "pictures again"
 )
 _COMPARABLE = 12
-"""Least number of views whose halves must agree if none was rejected; less than 6 views determine little."""
+"""Least number of views whose halves must agree: less than 6 views determine little."""
 _OUTLIER_PX = 3.0
 _LOSS_PX = 0.5
 
@@ -140,8 +142,7 @@ def solve_hand_eye(board: Board, views: Sequence[View]) -> HandEye:
     looked_at = np.mean([(view.T_base_tcp @ T_tcp_board).position for view in chosen], axis=0)
     apart = [half.apply(T_base_camera.inverse().apply(looked_at)) for half in halves]
     half_translation_m = float(np.linalg.norm(apart[0] - apart[1]))
-    comparable = len(used) >= _COMPARABLE or len(used) < len(usable)
-    if comparable and half_translation_m > MAX_HALF_M:
+    if len(used) >= _COMPARABLE and half_translation_m > MAX_HALF_M:
         raise BadCalibrationSet(
             "the calibration does not repeat: two halves of the pictures place the board "
             f"{half_translation_m * 1e3:.1f} mm apart, at most {MAX_HALF_M * 1e3:g} mm are allowed; "

@@ -32,7 +32,7 @@ from hal.doctor.gripper import measure_gripper
 from hal.doctor.hand_checks import check_grip, check_hand
 from hal.errors import BadBackend
 from hal.open_cell import cell_from_values
-from hal.operator import Operator, StoppedByOperator
+from hal.operator import Operator
 from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadConfig, UsageError
 from mskgrasp.runtime.console_table import report_console
@@ -65,7 +65,7 @@ def examine(path: Path, *, move: bool, dry_run: bool = False) -> Iterator[Findin
 
     Raises:
         BadConfig: The file cannot be read.
-        StoppedByOperator: The operator does not want the arm to move.
+        StoppedByOperator: The operator ends the program.
     """
     found: list[Finding] = []
     for finding in _examine(path, found, move=move, dry_run=dry_run):
@@ -109,7 +109,8 @@ def _examine(path: Path, found: Sequence[Finding], *, move: bool, dry_run: bool)
         yield from _check_camera(cell)
         if not (move or dry_run):
             return
-        refusal = _failed("motion", found) or _unasked(cell)
+        subject = "motion" if move else "dry run"
+        refusal = _failed(subject, found) or _unasked(subject, cell)
         if refusal is not None:
             yield refusal
             return
@@ -127,21 +128,21 @@ def _failed(subject: str, found: Sequence[Finding]) -> Finding | None:
     return Finding(level="fail", subject=subject, text="not checked: repair what failed first")
 
 
-def _unasked(cell: Cell) -> Finding | None:
-    """Ask once before a real arm moves; the finding that no operator can be asked, None if one agreed.
+def _unasked(subject: str, cell: Cell) -> Finding | None:
+    """Ask once before a real arm moves; the finding that no operator agreed, None if one did.
 
     Raises:
-        StoppedByOperator: The operator does not want the arm to move.
+        StoppedByOperator: The operator ends the program.
     """
     try:
         operator = Operator(cell)
     except UsageError as error:
-        return Finding(level="fail", subject="motion", text=f"not checked: {error}")
+        return Finding(level="fail", subject=subject, text=f"not checked: {error}")
     if not operator.confirm(
         "The arm and its fingers move. Is the cell clear, and your hand on the emergency stop? May the arm "
         "move? y: yes, n: no: "
     ):
-        raise StoppedByOperator("stopped by the operator; nothing moved")
+        return Finding(level="fail", subject=subject, text="not checked: the operator said no")
     return None
 
 

@@ -35,7 +35,6 @@ _HEADINGS = {
     "predicted": "corrected by the prediction",
     "seen": "part seen in hand",
 }
-_NOT_THE_SAME = "but is not the same"
 _ONLY_LOOKS = (
     "Where the part only looks the same, the camera cannot tell these turns apart: the trials count a part "
     "that is placed in another of them as turned."
@@ -240,7 +239,7 @@ def poses_section(part: Part, certified: CertifiedGrasps, figure: Path) -> Secti
             f"{friction}, force {force} N a pad, and the arm's {1e3 * noise['arm_position_std']:g} mm. The "
             f"pads stay {1e3 * conditions['clearance']:g} mm over the table (--clearance). The smallest of "
             "several estimates is somewhat too small; the trials above are other simulations.",
-            *([_ONLY_LOOKS] if any(row[2].endswith(_NOT_THE_SAME) for row in rows) else []),
+            *([_ONLY_LOOKS] if not all(one.symmetric for one in looks.values()) else []),
         ],
         tables=[
             Table(
@@ -264,7 +263,7 @@ def _turns(lying: Lying) -> str:
     if lying.order == 1:
         return "-"
     turns = f"{360 / lying.order:.3g} degrees" if lying.order else "any angle"
-    return turns if lying.symmetric else f"{turns}, {_NOT_THE_SAME}"
+    return turns if lying.symmetric else f"{turns}, but is not the same"
 
 
 def _grasps_section(certified: CertifiedGrasps) -> Section:

@@ -324,9 +324,9 @@ def _shard_samples(
 def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
     """Assign each part to a side of the split.
 
-    Training and validation get one at least: where one of them would be empty, it takes a part of training or
-    of new_sizes, or one that the name puts on validation; never a test part or one of the catalogue's
-    validation families. A part keeps its side when other parts join the dataset, unless it was taken so.
+    Training and validation get one at least: where one of them would be empty, it takes a part of training,
+    or one that the name puts on validation; never a part that the catalogue holds out. A part keeps its side
+    when other parts join the dataset, unless it was taken so.
 
     Args:
         parts: Names.
@@ -373,8 +373,6 @@ def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "cat
 
 def _is_spare(side: Split, count: Mapping[Split, int], in_catalogue: bool) -> bool:
     """Whether a part of a side can be given to training or validation, of which one has none."""
-    if side == "new_sizes":
-        return True
     return count[side] > 1 and (side == "train" or (side == "validation" and not in_catalogue))
 
 

@@ -101,17 +101,17 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
             f"{len(untried)} of {len(names)} parts are not tried: {config.slots} has room for {len(slots)}, "
             f"and is filled {config.trials} times; raise --trials to try all"
         )
+    cell = cell_from_yaml(config.cell)
     pairs = [(find_part(task.part), task.slot) for pallet in pallets for task in pallet]
     check_room(pairs)
     if config.slots is not None:
-        check_parts_beside_region(cell_from_yaml(config.cell), pairs)
+        check_parts_beside_region(cell, pairs)
     inputs = inputs_of(config.cell, config.models, names)
     if config.slots is not None:
         inputs["slots"] = file_digest(config.slots)
     may_change = ["out", "trials", "corrections", "workers", "yes", *BY_CONTENT]
     # The parts determine which of them fills which slot.
     may_change += ["parts", "n_parts"] if config.slots is None else []
-    cell = cell_from_yaml(config.cell)
     tell_model(models, cell)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         if config.planner.policy == "certified":

@@ -90,7 +90,9 @@ def _array(name: str, data: bytes, most: int) -> np.ndarray:
         raise Rejected(400, f"array {name} holds {dtype}; send float32, float64 or integers")
     # With a side of 0 the product bounds no other side, and a list of it would have an entry for each row.
     if len(shape) > 2 or any(type(side) is not int or side < 1 for side in shape):  # numpy reads True, too
-        raise Rejected(400, f"array {name} has shape {shape}; send one of two dimensions at most, each of 1 or more")
+        raise Rejected(
+            400, f"array {name} has shape {shape}; send one of two dimensions at most, each of 1 or more"
+        )
     n = int(np.prod(shape, dtype=object))
     rest = data[file.tell() :]
     if n > most:

@@ -186,8 +186,8 @@ class CellPanel(Panel):
             return
         if self.cell.arm.in_hand() is not None:
             raise HandFull(
-                "the hand holds something, which would fall as the fingers open; nothing moved: hold it, "
-                "press 'recover and go home', then plan again"
+                "the hand holds something, which would fall as the fingers open; nothing moved: press "
+                "'recover and go home', with the part in your hand on a real cell, then plan again"
             )
         self._set_plan(None)  # the part will lie elsewhere
         self.page.tell("the arm moves ...")

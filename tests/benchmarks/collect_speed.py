@@ -365,7 +365,7 @@ def report(
     rate = {row.program: row.grasps / row.seconds for row in rows}
     table = Table(
         header=(
-            "one core", "grasps/s", "collector's rate by this rate", "lifted", "in PhysX and renderer",
+            "one core", "grasps/s", "collector / this program", "lifted", "in PhysX and renderer",
             "in friction on the table",
         ),
         rows=[

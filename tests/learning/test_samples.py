@@ -135,9 +135,11 @@ def named(tmp_path_factory):
     [
         ({"train": 1, "test": 3}, "validation"),
         ({"test": 3}, "validation"),
-        ({"new_sizes": 1, "test": 2}, "train"),
+        ({"new_sizes": 1, "test": 2}, "validation"),
         ({"validation": 1, "test": 3}, "train"),
         ({"validation": 3}, "train"),
+        ({"train": 1, "new_sizes": 1}, "validation"),
+        ({"new_sizes": 2}, "validation"),
     ],
     ids=str,
 )
@@ -147,10 +149,9 @@ def test_a_side_without_parts_takes_none_of_the_held_out_families(named, numbers
         part_sides(parts, 0.2, "catalogue")
 
 
-@pytest.mark.parametrize("numbers", [{"train": 2}, {"train": 1, "new_sizes": 1}, {"new_sizes": 2}], ids=str)
-def test_a_side_without_parts_takes_one_that_may_be_trained_on(named, numbers):
-    held_out = {name: "test" for name in named["test"][:5]}
-    others = tuple(name for side, n in numbers.items() for name in named[side][:n])
+def test_a_side_without_parts_takes_one_that_may_be_trained_on(named):
+    held_out = {name: "test" for name in named["test"][:5]} | {named["new_sizes"][0]: "new_sizes"}
+    others = tuple(named["train"][:2])
     sides = part_sides((*held_out, *others), 0.2, "catalogue")
     assert held_out.items() <= sides.items()
     assert {sides[name] for name in others} == {"train", "validation"}

@@ -33,7 +33,7 @@ def test_a_nut_and_a_washer_are_the_same_after_every_turn_at_which_they_look_the
 def test_a_plate_keyed_by_a_small_hole_or_on_its_underside_only_looks_the_same(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     plate = trimesh.creation.box([0.1, 0.06, 0.008])
-    # Through holes: one of 3 mm, smaller than a pixel sees, and a blind one of 10 mm.
+    # Holes: a through one of 3 mm, too small to be seen, and a blind one of 10 mm.
     for name, radius, height in (("hole", 0.0015, 0.02), ("blind", 0.005, 0.004)):
         drill = trimesh.creation.cylinder(radius=radius, height=height)
         drill.apply_translation([0.04, 0.02, 0.004])
