@@ -76,6 +76,9 @@ class CollectConfig(Config):
     """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
     labels: tuple[Path, ...] = ()
     """Files of `mskgrasp.dataset export --format labels`: their shards are rendered, not simulated again."""
+    planned_by: Path | None = None
+    """Folder of a trained model whose planner chooses the grasps, so that networks learn from its choices,
+    too (train's --planned); null: grasps are random."""
     part_filter: PartFilter = PartFilter()
     """Bounds on the size of parts and on how easily they are grasped."""
     camera: Overhead = Overhead()
@@ -96,6 +99,12 @@ class CollectConfig(Config):
                 )
         if self.labels and self.cluster is not None:
             raise ValueError("labels are rendered by this machine's processes alone: leave cluster out")
+        if self.planned_by is not None and self.cluster is not None:
+            raise ValueError("grasps are planned by this machine's processes alone: leave cluster out")
+        if self.planned_by is not None and self.part_filter.bounds_success:
+            raise ValueError(
+                "part_filter.min_success and max_success are of random grasps: leave them out with planned_by"
+            )
         self.camera.check_sees(REGION)
         return self
 

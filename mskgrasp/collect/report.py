@@ -130,7 +130,7 @@ def print_summary(summaries: list[PartSummary], console: Console | None = None) 
         _counts(failures), _counts(discarded), f"{sum(row.kept for row in summaries)} parts",
     )  # fmt: skip
     table = Table(header=_HEADER, rows=[*rows, total], total=True)
-    print_sections([Section(title="Random grasps by part", text=[_EXPLAINED], tables=[table])], console)
+    print_sections([Section(title="Grasps by part", text=[_EXPLAINED], tables=[table])], console)
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -159,5 +159,5 @@ def draw_summary(folder: Path, seed: int) -> Path:
             rows.append((attempts, info, int(rng.choice(candidates))))
     path = folder / "summary.png"
     n_parts = len({path.name.rsplit("-", 1)[0] for path in paths})
-    draw_contact_sheet(rows, path, title=f"Random grasps of {n_parts} parts, seen from above")
+    draw_contact_sheet(rows, path, title=f"Grasps of {n_parts} parts, seen from above")
     return path

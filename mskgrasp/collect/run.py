@@ -44,8 +44,9 @@ def collect(config: CollectConfig) -> None:
     if config.cluster is not None:
         check_cluster(config.cluster)
     known = read_labels(config.labels)
+    planner = planner_digest(config, known)
     for one in known.values():
-        check_labels(one.info, config)
+        check_labels(one.info, config, planner)
     # Sets are stored as names of parts: a catalogue that grows must not change an existing dataset.
     names = chosen_names(config.parts or ("starter",))
     if config.sample:
@@ -60,11 +61,30 @@ def collect(config: CollectConfig) -> None:
         with exclusive_lock(config.out) as alone:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
-            _collect(config, [part for _, part in parts], known)
+            _collect(config, [part for _, part in parts], known, planner)
 
 
-def check_labels(info: ShardInfo, config: CollectConfig) -> None:
-    """Refuse labels of other settings, or of another simulation.
+def planner_digest(config: CollectConfig, known: Mapping[tuple[str, int], ShardLabels]) -> str:
+    """Digest of the model whose planner chooses the grasps, or chose those of the labels; empty: random ones.
+
+    Raises:
+        MissingModel: There is no model in the folder.
+        BadModel: It is damaged, or predicts no variance.
+    """
+    if config.planned_by is None:
+        return next((one.info.planner for one in known.values()), "")
+    from mskgrasp.simulation.planned_grasps import PlannedGrasps  # loads torch
+
+    return PlannedGrasps(config.planned_by).digest
+
+
+def check_labels(info: ShardInfo, config: CollectConfig, planner: str = "") -> None:
+    """Refuse labels of other settings, of another simulation, or of grasps that are chosen otherwise.
+
+    Args:
+        info: Of a shard of labels.
+        config: The run's settings.
+        planner: As `planner_digest`.
 
     Raises:
         BadDataset: They differ.
@@ -79,6 +99,8 @@ def check_labels(info: ShardInfo, config: CollectConfig) -> None:
     changed = [key for key, value in settings.items() if np.asarray(getattr(info, key)).tolist() != value]
     if info.T_base_camera.position[2] != config.camera.height:
         changed.append("camera.height")
+    if info.planner != planner:
+        changed.append("the model of planned_by")
     if changed:
         raise BadDataset(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
     if info.versions.get("simulation") != str(SIMULATION_VERSION):
@@ -116,24 +138,30 @@ def sampled(names: list[str], count: int) -> list[str]:
     return [entry.name for entry in representative_entries((index.parts[name] for name in names), count)]
 
 
-def _collect(config: CollectConfig, parts: list[Part], known: Mapping[tuple[str, int], ShardLabels]) -> None:
+def _collect(
+    config: CollectConfig, parts: list[Part], known: Mapping[tuple[str, int], ShardLabels], planner: str
+) -> None:
     hashes = {part.name: part.content_hash for part in parts}
     # Another processor may round a part's mesh otherwise: its labels belong to that machine.
     other = sorted({name for (name, _), one in known.items() if one.info.part_hash != hashes.get(name)})
+    restored_only = planner and config.planned_by is None
     if other := [name for name in other if name in hashes]:
+        fate = "left out, as no model plans their grasps" if restored_only else "their grasps are simulated"
         note(
             f"{len(other)} of {len(parts)} parts are not exactly those of --labels ({', '.join(other[:3])}"
-            f"{', ...' if len(other) > 3 else ''}): their grasps are simulated"
+            f"{', ...' if len(other) > 3 else ''}): {fate}"
         )
     prepare_folder(config)
     tasks = plan_shards(config, parts)
+    if restored_only:
+        tasks = [task for task in tasks if task.part not in other and (task.part, task.index) in known]
     if config.part_filter.bounds_success:
-        _make_missing(config, [task for task in tasks if task.index == 0], parts, known)
+        _make_missing(config, [task for task in tasks if task.index == 0], parts, known, planner)
         parts = passing_parts(config, parts)
         print(f"{len(parts)} parts pass the part filter by the success of their first shard")
         names = {part.name for part in parts}
         tasks = [task for task in tasks if task.index > 0 and task.part in names]
-    _make_missing(config, tasks, parts, known)
+    _make_missing(config, tasks, parts, known, planner)
     with ctrl_c_deferred():  # takes seconds
         from mskgrasp.collect.report import draw_summary, print_summary, summarise_parts, write_summary
 
@@ -154,6 +182,7 @@ def _make_missing(
     tasks: list[ShardTask],
     parts: list[Part],
     known: Mapping[tuple[str, int], ShardLabels],
+    planner: str,
 ) -> None:
     """Simulate those of the shards that are not on disk."""
     hashes = {part.name: part.content_hash for part in parts}
@@ -161,7 +190,7 @@ def _make_missing(
     missing = [
         task
         for task in checked
-        if not is_done(config.out, task, hashes[task.part], known.get((task.part, task.index)))
+        if not is_done(config.out, task, hashes[task.part], known.get((task.part, task.index)), planner)
     ]
     done = sum(task.n for task in tasks) - sum(task.n for task in missing)
     print(
@@ -269,7 +298,9 @@ def plan_shards(config: CollectConfig, parts: list[Part]) -> list[ShardTask]:
     ]
 
 
-def is_done(out: Path, task: ShardTask, part_hash: str, labels: ShardLabels | None = None) -> bool:
+def is_done(
+    out: Path, task: ShardTask, part_hash: str, labels: ShardLabels | None = None, planner: str = ""
+) -> bool:
     """Whether a shard is on disk and whole; a damaged one is reported, and will be made again.
 
     Args:
@@ -277,9 +308,10 @@ def is_done(out: Path, task: ShardTask, part_hash: str, labels: ShardLabels | No
         task: The shard.
         part_hash: Content hash of its part.
         labels: Its labels, where they are known: a shard made from them states the software that made them.
+        planner: As `planner_digest`.
 
     Raises:
-        BadDataset: The part or the simulation has changed since the shard was made.
+        BadDataset: The part, the simulation or the planner's model has changed since the shard was made.
     """
     path = shard_path(out, task.part, task.index)
     if not path.exists():
@@ -306,6 +338,8 @@ def is_done(out: Path, task: ShardTask, part_hash: str, labels: ShardLabels | No
             f"{path} holds labels of fidelity '{info.fidelity}', the collector makes those of 'cpu'; choose "
             "another --out"
         )
+    if info.planner != planner:
+        raise BadDataset(f"{path} holds grasps of another model's planner; choose another --out")
     other = other_versions(info.versions)
     if other and (labels is None or labels.info.versions != info.versions):
         raise BadDataset(f"{path} was made by other software: {other}; choose another --out")

@@ -37,7 +37,7 @@ def _shard_maker(config: CollectConfig) -> Iterator[Callable[[ShardTask], Iterat
     """A simulator, and the function that makes a shard and writes it, yielding every attempt's outcome."""
     from mskgrasp.simulation.shard import Simulator
 
-    simulator = Simulator(config.physics, config.camera, config.noise)
+    simulator = Simulator(config.physics, config.camera, config.noise, planned_by=config.planned_by)
     known = read_labels(config.labels)
 
     def make(task: ShardTask) -> Iterator[int]:

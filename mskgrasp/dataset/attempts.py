@@ -130,6 +130,7 @@ class ShardInfo:
             contact points are cached and overlaps of hand and part are not seen.
         hand: Measures of the hand, metres; empty: not recorded.
         noise: Simulated errors of the cell; empty: none.
+        planner: Digest of the model whose planner chose the grasps; empty: they are random.
     """
 
     part: str
@@ -149,6 +150,7 @@ class ShardInfo:
     fidelity: str = "cpu"
     hand: dict[str, float] = field(default_factory=dict)
     noise: dict[str, Any] = field(default_factory=dict)
+    planner: str = ""
 
 
 def depth_to_u16(depth: np.ndarray) -> np.ndarray:

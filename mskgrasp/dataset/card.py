@@ -48,6 +48,7 @@ class Card:
         turn: The same of |dtheta|, radians.
         image: Height and width of a depth image, pixels.
         seed: Seed of all random numbers.
+        planner: Digest of the model whose planner chose the grasps; empty: they are random.
         physics: Settings of the simulation.
         noise: Simulated errors of the cell; empty: none.
         versions: Sets of software versions, and how many shards were made with each.
@@ -64,6 +65,7 @@ class Card:
     turn: tuple[float, float] | None
     image: tuple[int, int]
     seed: int
+    planner: str
     physics: dict[str, Any]
     noise: dict[str, Any]
     versions: list[tuple[dict[str, str], int]]
@@ -127,6 +129,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         turn=_median_and_tail(np.abs(held[:, 3])),
         image=image,
         seed=info.seed,
+        planner=info.planner,
         physics=dict(info.physics),
         noise=dict(info.noise),
         versions=[(dict(names), n) for names, n in versions.most_common()],
@@ -156,6 +159,7 @@ def tables(card: Card) -> list[CardTable]:
     n, families = card.attempts, card.families.values()
     facts = [
         ("attempts", f"{n}"),
+        ("grasps", f"chosen by the planner of model {card.planner}" if card.planner else "random"),
         ("parts", f"{card.parts} of {len(card.families)} families"),
         ("success", _share([k for f in families for k in f.won], [k for f in families for k in f.tried])),
     ]

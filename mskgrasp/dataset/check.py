@@ -21,7 +21,10 @@ from mskgrasp.parts import store
 
 _MOST_MISSING = 100
 """Missing shards of a part that are named one by one."""
-SHARED = ("seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand")
+SHARED = (
+    "seed", "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand",
+    "planner",
+)  # fmt: skip
 """Properties that all shards of a dataset share."""
 
 

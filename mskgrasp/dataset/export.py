@@ -22,7 +22,9 @@ from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 Watch = Callable[[Sequence[Path]], Iterable[Path]]
 """Yields each of the files that will be read; may show a progress bar."""
 SMALL = tuple(name for name in COLUMNS if name != "depth")
-_SHARED = ("region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand")
+_SHARED = (
+    "region", "table_z", "intrinsics", "T_base_camera", "physics", "noise", "fidelity", "hand", "planner",
+)  # fmt: skip
 
 
 def check_export_path(folder: Path, path: Path, suffix: str) -> list[Path]:
@@ -118,6 +120,7 @@ def _about(infos: list[ShardInfo], counts: list[int]) -> dict[str, np.ndarray]:
         region=np.array(info.region),
         physics_json=np.array(json.dumps(info.physics, sort_keys=True)),
         noise_json=np.array(json.dumps(info.noise, sort_keys=True)),
+        planner=np.array(info.planner),
         units_json=np.array(json.dumps({name: f"{c.unit}; frame: {c.frame}" for name, c in COLUMNS.items()})),
     )
 

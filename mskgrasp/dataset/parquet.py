@@ -125,6 +125,7 @@ def _schema(info: ShardInfo) -> pyarrow.Schema:
         "physics": info.physics,
         "noise": info.noise,
         "seed": info.seed,
+        "planner": info.planner,
     }
     return pa.schema(columns, metadata={"mskgrasp": json.dumps(shared)})
 

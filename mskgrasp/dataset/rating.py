@@ -33,6 +33,11 @@ def rate_parts(folder: Path) -> dict[str, Rating]:
     hashes: dict[str, str] = {}
     for path in list_shards(folder):
         success, info = read_success(path)
+        if info.planner:
+            raise BadDataset(
+                f"{path}: a planner chose these grasps, parts are rated by random ones; collect without "
+                "--planned-by"
+            )
         if hashes.setdefault(info.part, info.part_hash) != info.part_hash:
             raise BadDataset(f"{path}: part {info.part!r} changed while it was collected; collect it again")
         outcomes[info.part].append(success)

@@ -107,6 +107,7 @@ def _file_image(attempts: Attempts, info: ShardInfo) -> bytes:
         file.attrs["schema_version"] = SCHEMA_VERSION
         for name in (
             "part", "part_hash", "family", "index", "seed", "table_z", "redrawn", "toppled", "fidelity",
+            "planner",
         ):  # fmt: skip
             file.attrs[name] = getattr(info, name)
         file.attrs["intrinsics"] = np.asarray(info.intrinsics, dtype=np.float64)
@@ -247,6 +248,7 @@ def _read_info(file: h5py.File) -> ShardInfo:
         fidelity=str(attrs.get("fidelity", "cpu")),
         hand=_mapping(attrs, "hand") if "hand" in attrs else {},
         noise=_mapping(attrs, "noise") if "noise" in attrs else {},
+        planner=str(attrs.get("planner", "")),
     )
 
 

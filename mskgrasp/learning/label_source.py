@@ -32,6 +32,8 @@ class LabelSource(Config):
     """Height of the camera above the table."""
     seed: int
     """Seed of the collection."""
+    planner: str = ""
+    """Digest of the model whose planner chose the grasps; empty: they are random."""
 
     @field_validator("physics", "noise")
     @classmethod
@@ -58,6 +60,7 @@ def source_of(info: ShardInfo) -> LabelSource:
         hand=info.hand,
         camera_height=float(info.T_base_camera.position[2]) - info.table_z,
         seed=info.seed,
+        planner=info.planner,
     )
     try:
         return LabelSource.model_validate(values)
@@ -83,6 +86,7 @@ def source_text(source: LabelSource) -> str:
     return (
         f"simulation version {source.simulation}, fidelity {source.fidelity}, camera "
         f"{source.camera_height:.2f} m over the table, errors of the cell: {drawn or 'none'}"
+        + (", grasps chosen by a planner" if source.planner else "")
     )
 
 

@@ -134,6 +134,37 @@ class Samples:
         chosen["part"] = torch.searchsorted(torch.tensor(kept, device=self.part.device), chosen["part"])
         return replace(self, **chosen, parts=tuple(self.parts[i] for i in kept))
 
+    def joined(self, other: Samples) -> Samples:
+        """Add the samples of another dataset at these parts; those of other parts are left out.
+
+        Raises:
+            BadDataset: It has none of these parts.
+        """
+        number = {name: index for index, name in enumerate(self.parts)}
+        own = torch.tensor([number.get(name, -1) for name in other.parts], device=other.part.device)[
+            other.part
+        ]
+        rows = own >= 0
+        if not rows.any():
+            raise BadDataset("no attempt of the second dataset is at a part of the first; collect some there")
+        arrays = {
+            name: torch.cat([values, own[rows] if name == "part" else getattr(other, name)[rows]])
+            for name, values in vars(self).items()
+            if isinstance(values, Tensor)
+        }
+        return replace(
+            self,
+            **arrays,
+            skipped=dict(Counter(self.skipped) + Counter(other.skipped)),
+            fingerprint=joined_fingerprint(self.fingerprint, other.fingerprint),
+            sources=distinct((*self.sources, *other.sources)),
+        )
+
+
+def joined_fingerprint(*fingerprints: str) -> str:
+    """Digest of several datasets that are learned together, from that of each."""
+    return hashlib.sha256("".join(fingerprints).encode()).hexdigest()
+
 
 def read_samples(
     folder: Path,

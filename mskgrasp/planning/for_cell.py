@@ -37,9 +37,9 @@ def tell_model(models: Models, cell: Cell) -> None:
     height = None if pose is None else float(pose.position[2]) - cell.workspace.table_z
     for source in models.meta.labels:
         print(f"model: labels of {source_text(source)}")
-        other = other_conditions(source, cell.physics, height)
-        if other:
-            note(f"warning: the model's labels were made under other conditions: here {'; '.join(other)}")
+    warned = {"; ".join(other_conditions(source, cell.physics, height)) for source in models.meta.labels}
+    for other in sorted(warned - {""}):
+        note(f"warning: the model's labels were made under other conditions: here {other}")
 
 
 def present(cell: Cell, part: str, seed: int) -> None:

@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 import torch
 
-from mskgrasp.core.errors import BadDataset, NoPartFound
+from mskgrasp.core.errors import BadDataset, NoPartFound, TableTooHigh
 from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
@@ -20,6 +20,7 @@ from mskgrasp.dataset import Attempts, ShardInfo, depth_to_u16, shard_path, u16_
 from mskgrasp.dataset.attempts import COLUMNS
 from mskgrasp.dataset.labels import ShardLabels
 from mskgrasp.perception.part_detection import view_part
+from mskgrasp.simulation.planned_grasps import PlannedGrasps
 from mskgrasp.simulation.shard_task import ShardTask
 from mskgrasp.simulation.versions import versions
 from tasks import GraspDisplacementEnv
@@ -37,10 +38,30 @@ MOST_REDRAWS = 4
 class Simulator:
     """The environment of one worker, built once and refilled with part after part."""
 
-    def __init__(self, physics: Physics, camera: Overhead, noise: ExecutionNoise):
+    def __init__(
+        self,
+        physics: Physics,
+        camera: Overhead,
+        noise: ExecutionNoise,
+        *,
+        planned_by: Path | None = None,
+    ):
+        """Take the settings.
+
+        Args:
+            physics: Of the cell.
+            camera: The overhead camera.
+            noise: Errors of the cell.
+            planned_by: Folder of the model whose planner chooses the grasps; None: they are random.
+
+        Raises:
+            MissingModel: There is no model in the folder.
+            BadModel: It is damaged, or predicts no variance.
+        """
         self._physics = physics
         self._camera = camera
         self._noise = noise
+        self._planned = None if planned_by is None else PlannedGrasps(planned_by)
         self._env: gymnasium.Env | None = None
 
     def load(self, folder: str) -> GraspDisplacementEnv:
@@ -83,10 +104,10 @@ class Simulator:
         redrawn = 0
         for attempt in range(task.first, task.first + task.n):
             draw = 0
-            row, reason = _try(env, task, attempt, draw)
+            row, reason = _try(env, task, attempt, draw, self._planned)
             while reason == "unsettled" and draw < MOST_REDRAWS:
                 draw += 1
-                row, reason = _try(env, task, attempt, draw)
+                row, reason = _try(env, task, attempt, draw, self._planned)
             redrawn += draw
             if reason:
                 discarded[reason] += 1
@@ -113,6 +134,7 @@ class Simulator:
             toppled=env.standing[0].toppled,
             fidelity=env.fidelity,
             hand=HAND_GEOMETRY,
+            planner="" if self._planned is None else self._planned.digest,
         )
         return attempts, info
 
@@ -147,10 +169,10 @@ class Simulator:
 
 
 def _try(
-    env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int
+    env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int, planned: PlannedGrasps | None
 ) -> tuple[dict[str, np.ndarray], str]:
     """One attempt as a row of the shard, and the reason why it is not one; empty where it is."""
-    depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw)
+    depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw, planned)
     if grasp is None:
         return {}, "part_not_seen"
     outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
@@ -161,9 +183,14 @@ def _try(
 
 
 def draw_attempt(
-    env: GraspDisplacementEnv, part: str, seed: int, attempt: int, draw: int = 0
+    env: GraspDisplacementEnv,
+    part: str,
+    seed: int,
+    attempt: int,
+    draw: int = 0,
+    planned: PlannedGrasps | None = None,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Place the part as determined by seed and attempt number, take a depth image and draw a grasp.
+    """Place the part as determined by seed and attempt number, take a depth image and choose a grasp.
 
     Args:
         env: Holds the part.
@@ -171,12 +198,20 @@ def draw_attempt(
         seed: Seed of the run.
         attempt: Number of the attempt among those of the part.
         draw: Number of times that the attempt was drawn before, with a part that was not at rest.
+        planned: Chooses the grasp; None: it is drawn at random.
 
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
         camera does not see the part.
     """
     depth, grasp_seed = capture_scene(env, part, seed, attempt, draw)
+    rng = np.random.default_rng(grasp_seed)
+    if planned is not None:
+        try:
+            chosen = planned.choose(u16_to_depth(depth), env.intrinsics, env.T_base_camera, rng)
+        except (NoPartFound, TableTooHigh):
+            return depth, None
+        return depth, chosen[None].astype(np.float32)
     try:
         view = view_part(
             u16_to_depth(depth),
@@ -187,7 +222,7 @@ def draw_attempt(
         )
     except NoPartFound:
         return depth, None
-    return depth, sample_grasps(view, 1, np.random.default_rng(grasp_seed)).astype(np.float32)
+    return depth, sample_grasps(view, 1, rng).astype(np.float32)
 
 
 def capture_scene(

@@ -22,7 +22,7 @@ from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, ModelMeta, read_meta, save_model
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
-from mskgrasp.learning.samples import Samples, read_samples
+from mskgrasp.learning.samples import Samples, joined_fingerprint, read_samples
 from mskgrasp.learning.sides import Sides, split
 from mskgrasp.learning.stage import Reporter
 from mskgrasp.learning.trainer import train
@@ -98,7 +98,7 @@ def run_training(config: TrainConfig) -> int:
     out = config.out
     _check_out(config, out)
     if (out / DESCRIPTION).exists() and (out / WEIGHTS).exists():
-        _check_trained_on(config.data, out)
+        _check_trained_on([config.data, *([config.planned] if config.planned else [])], out)
         (out / CHECKPOINT).unlink(missing_ok=True)
         print(f"{out} is trained already; choose another --out to train again")
         return 0
@@ -146,7 +146,7 @@ def _check_out(config: TrainConfig, out: Path) -> None:
         return
     if not (out / "config.yaml").is_file():
         raise UsageError(f"{out} exists and holds no training run; choose another --out")
-    here = {"data", "out", "device"}
+    here = {"data", "planned", "out", "device"}
     try:
         before = read_config(TrainConfig, out / "config.yaml").model_dump(exclude=here)
     except BadConfig as error:
@@ -160,17 +160,21 @@ def _check_out(config: TrainConfig, out: Path) -> None:
         )
 
 
-def _check_trained_on(data: Path, out: Path) -> None:
-    """Refuse a folder with a model of other data.
+def _check_trained_on(data: list[Path], out: Path) -> None:
+    """Refuse a folder with a model of other data than these datasets.
 
     Raises:
         UsageError: It was trained on other grasps.
     """
     known = read_meta(out / DESCRIPTION).training.get("data_fingerprint")
-    found = dataset_fingerprint(data, lambda paths: progress(paths, title="compare data", unit="shard"))
-    if known not in (None, found):
+    found = [
+        dataset_fingerprint(folder, lambda paths: progress(paths, title="compare data", unit="shard"))
+        for folder in data
+    ]
+    if known not in (None, joined_fingerprint(*found) if len(found) > 1 else found[0]):
         raise UsageError(
-            f"{out} holds a model that was trained on other data than {data}; choose another --out"
+            f"{out} holds a model that was trained on other data than {' and '.join(map(str, data))}; choose "
+            "another --out"
         )
 
 
@@ -183,8 +187,7 @@ def _warn_of_few(n_attempts: int, n_parts: int) -> None:
 
 
 def _read(config: TrainConfig, data: Path) -> Samples:
-    with progress(title="read shards", unit="shard") as bar:
-        samples = read_samples(data, config.network, advance=partial(advance_to, bar))
+    samples = _read_dataset(config, data)
     kept = samples.of_parts_between(*config.success_range)
     if len(kept.parts) < 2 <= len(samples.parts):
         usable = {samples.parts[number] for number in samples.part.unique().tolist()}
@@ -200,7 +203,12 @@ def _read(config: TrainConfig, data: Path) -> Samples:
             f"of the {len(usable)} parts only {kept.parts[0]} has a success in {low:g}..{high:g}, and "
             "validation needs another; widen success_range"
         )
-    return kept
+    return kept if config.planned is None else kept.joined(_read_dataset(config, config.planned))
+
+
+def _read_dataset(config: TrainConfig, folder: Path) -> Samples:
+    with progress(title=f"read {folder.name}", unit="shard") as bar:
+        return read_samples(folder, config.network, advance=partial(advance_to, bar))
 
 
 def _table(history: list[EpochMetrics]) -> str:

@@ -22,6 +22,7 @@ from mskgrasp.collect.config import CollectConfig, PartFilter
 from mskgrasp.collect.run import check_out, chosen_parts, is_done
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
+from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.dataset import list_shards, read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import export_labels
 from mskgrasp.parts import store
@@ -151,6 +152,9 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected
         ("camera: {height: 0.31}", 2, "the camera sees 0.14 m"),
         ("physics: {friction_table_part: -0.1}", 2, "physics.friction_table_part"),
         ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 1, "no part is left"),
+        ("planned_by: /nowhere\nparts: [hex_nut_m30]", 2, "no model.json in /nowhere; train a model"),
+        ("planned_by: /nowhere\ncluster: auto", 2, "grasps are planned by this machine's processes alone"),
+        ("planned_by: /nowhere\npart_filter: {min_success: 0.1}", 2, "are of random grasps: leave them out"),
     ],
 )
 def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, message):
@@ -206,6 +210,28 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
         file.attrs["fidelity"] = "gpu"
     with pytest.raises(BadDataset, match="labels of fidelity 'gpu'"):
         is_done(out, task, info.part_hash)
+    with pytest.raises(BadDataset, match="holds grasps of another model's planner"):
+        is_done(collected, task, info.part_hash, planner="0123")
+
+
+def test_labels_of_planned_grasps_need_no_model_and_make_no_random_grasps(collected, tmp_path):
+    """As if a planner had chosen the grasps of a dataset that lacks one of its shards."""
+    before = Path(shutil.copytree(collected, tmp_path / "before"))
+    for path in list_shards(before):
+        with h5py.File(path, "r+") as file:
+            file.attrs["planner"] = "0123"
+    list_shards(before)[-1].unlink()
+    export_labels(before, tmp_path / "planned.labels")
+    done = run_here(main, *arguments(tmp_path / "data", "--labels", str(tmp_path / "planned.labels")))
+    assert done.returncode == 0, done.stderr
+    made = list_shards(tmp_path / "data")
+    assert [path.name for path in made] == [path.name for path in list_shards(before)]
+    assert all(read_shard(path)[1].planner == "0123" for path in made)
+    done = run_here(
+        main, *arguments(tmp_path / "other", "--labels", str(tmp_path / "planned.labels")),
+        "--planned-by", str(PRETRAINED),
+    )  # fmt: skip
+    assert done.returncode == 1 and "other settings (the model of planned_by differ)" in done.stderr
 
 
 def test_a_collection_from_labels_of_other_software_is_resumed_with_them(collected, tmp_path):

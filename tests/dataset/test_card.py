@@ -18,7 +18,7 @@ def test_the_card_counts_what_the_shards_hold(collected):
     assert (card.attempts, card.successes) == (len(success), int(success.sum()))
     assert card.shards == 4 and card.parts == 2 and card.seed == 5
     assert sum(card.failures.values()) == card.attempts - card.successes
-    assert card.discarded == {}
+    assert card.discarded == {} and card.planner == ""
     assert card.size == sum(path.stat().st_size for path in list_shards(collected))
     assert card.versions[0][0]["sapien"] and card.versions[0][1] == 4
     rows = json.loads((collected / "summary.json").read_text())["parts"]
@@ -31,6 +31,7 @@ def test_the_card_counts_what_the_shards_hold(collected):
 def test_intervals_are_by_parts_at_which_attempts_are_alike():
     facts = dict(tables(card_of(won=(40, 0, 40, 0), tried=(40, 40, 40, 40)))[0][2])
     assert facts["success"].startswith("50.0% (")
+    assert facts["grasps"] == "chosen by the planner of model 0123"
     low, high = re.findall(r"([\d.]+)%", facts["success"])[1:]
     assert float(low) < 10 and float(high) > 90  # by attempts: 42.3 to 57.7 %
 
@@ -38,8 +39,8 @@ def test_intervals_are_by_parts_at_which_attempts_are_alike():
 def card_of(won: tuple[int, ...], tried: tuple[int, ...]) -> Card:
     return Card(
         name="made", shards=4, parts=len(won), families={"nut": Family(won=won, tried=tried)}, failures={},
-        discarded={}, displacement=None, turn=None, image=(2, 2), seed=0, physics={}, noise={}, versions=[],
-        size=1,
+        discarded={}, displacement=None, turn=None, image=(2, 2), seed=0, planner="0123", physics={},
+        noise={}, versions=[], size=1,
     )  # fmt: skip
 
 

@@ -58,6 +58,14 @@ def test_a_part_that_changed_in_the_middle_is_refused(tmp_path: Path):
         rate_parts(folder)
 
 
+def test_grasps_that_a_planner_chose_rate_no_part(tmp_path: Path):
+    folder = write_dataset(tmp_path, n_parts=1, n_attempts=5, seed=0)
+    attempts, info = read_shard(shard_path(folder, "box_0", 0))
+    write_shard(shard_path(folder, "box_0", 0), attempts, replace(info, planner="0123"))
+    with pytest.raises(BadDataset, match="a planner chose these grasps, parts are rated by random ones"):
+        rate_parts(folder)
+
+
 def test_a_damaged_shard_is_named(tmp_path: Path):
     folder = write_dataset(tmp_path, n_parts=1, n_attempts=5, seed=0)
     path = shard_path(folder, "box_0", 0)

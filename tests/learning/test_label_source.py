@@ -92,3 +92,5 @@ def test_conditions_other_than_those_of_the_labels_are_named():
         "simulation version 4, fidelity cpu, camera 0.80 m over the table, errors of the cell: "
         "arm_position_std 0.001; friction_pad_part 0.3 to 0.8"
     )
+    chosen = source.model_copy(update={"planner": "0123"})
+    assert source_text(chosen) == f"{source_text(source)}, grasps chosen by a planner"

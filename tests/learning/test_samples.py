@@ -7,7 +7,7 @@ import torch
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.learning.samples import part_sides, read_samples
+from mskgrasp.learning.samples import joined_fingerprint, part_sides, read_samples
 from mskgrasp.parts import build_part
 from mskgrasp.parts.catalogue import Index, entry_of, make_index, split_of, write_index
 from mskgrasp.parts.recipes import cad, families
@@ -97,6 +97,24 @@ def test_parts_outside_the_success_range_are_left_out(dataset):
         assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
     with pytest.raises(BadDataset, match="widen success_range"):
         samples.of_parts_between(0.999, 0.9991)
+
+
+def test_planned_attempts_join_those_of_the_same_parts(dataset, tmp_path):
+    samples = read_samples(dataset, PATCH.network)
+    other = read_samples(synthetic.write_dataset(tmp_path, n_parts=9, n_attempts=5, seed=3), PATCH.network)
+    kept = samples.of_parts_between(0.0, float(samples.success.float().mean()))
+    joined = kept.joined(other)
+    assert joined.parts == kept.parts and 0 < len(kept.parts) < 8
+    assert len(joined) == len(kept) + 5 * len(kept.parts)
+    for number, name in enumerate(kept.parts):
+        added = joined.patches[len(kept) :][joined.part[len(kept) :] == number]
+        assert torch.equal(added, other.patches[other.part == other.parts.index(name)])
+    assert torch.equal(joined.success[: len(kept)], kept.success)
+    assert joined.fingerprint == joined_fingerprint(kept.fingerprint, other.fingerprint)
+    assert joined.fingerprint != other.joined(kept).fingerprint
+    foreign = dataclasses.replace(other, parts=tuple(f"other_{name}" for name in other.parts))
+    with pytest.raises(BadDataset, match="no attempt of the second dataset is at a part of the first"):
+        kept.joined(foreign)
 
 
 def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_path):

@@ -95,6 +95,24 @@ def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_pa
         train.run_training(few.model_copy(update={"data": other}))
 
 
+@pytest.mark.slow
+def test_planned_grasps_are_learned_beside_random_ones_and_named_in_the_model(dataset, tmp_path):
+    planned = synthetic.write_dataset(tmp_path / "planned", n_parts=8, n_attempts=10, seed=3)
+    for path in list_shards(planned):
+        attempts, info = read_shard(path)
+        write_shard(path, attempts, dataclasses.replace(info, planner="0123"))
+    out = tmp_path / "model"
+    both = program(SHORT, data=dataset, planned=planned, out=out, epochs=1)
+    assert train.run_training(both) == 0
+    meta = load_models(out).meta
+    assert meta.training["attempts"] == 7 * (80 + 10)
+    assert {source.planner for source in meta.labels} == {"", "0123"}
+    assert "grasps chosen by a planner" in (out / "card.md").read_text()
+    assert train.run_training(both) == 0  # finished, and of the same data
+    with pytest.raises(UsageError, match=f"trained on other data than {dataset}; choose"):
+        train.run_training(both.model_copy(update={"planned": None}))
+
+
 def test_a_checkpoint_of_other_data_keeps_the_settings_that_go_on_with_it(dataset, tmp_path, monkeypatch):
     out, other = tmp_path / "model", tmp_path / "other"
     few = program(SHORT, data=dataset, out=out, epochs=1)
