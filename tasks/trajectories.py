@@ -91,7 +91,7 @@ def write_trajectories(
         env_info=env_info,
         commit_info=None,
         episodes=listed,
-        source_type="random grasps",
+        source_type="simulated grasps",
         source_desc=description,
     )
     dump_json(path.with_suffix(".json"), record, indent=2)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 
-DESCRIPTION = """Simulates random grasps of parts and records what happened.
+DESCRIPTION = """Simulates grasps of parts and records what happened.
 
 For each part and attempt: the part lies in a resting pose at a random position and yaw, the overhead
-camera takes a depth image, a grasp is drawn uniformly from the part's box in that image, the arm tries
-it, and one row is written: success, reason of failure, how the part moved in the hand. A run that was
-stopped resumes when it is started again with the same settings.
+camera takes a depth image, a grasp is drawn uniformly from the part's box in that image (with
+--planned-by, a planner chooses it), the arm tries it, and one row is written: success, reason of failure,
+how the part moved in the hand. A run that was stopped resumes when it is started again with the same
+settings.
 
 A few grasps of two parts: python -m mskgrasp.collect --parts hex_nut_m30 washer_m36 --attempts-per-part 20
 

@@ -12,6 +12,10 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.settings import REGION, ExecutionNoise, Overhead, Physics
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 
+SUCCESS_IS_OF_RANDOM = (
+    "part_filter.min_success and max_success are of random grasps, these are planned: leave them out"
+)
+
 
 class PartFilter(Config):
     """Bounds on the parts to collect and to learn from; null switches a bound off."""
@@ -102,9 +106,7 @@ class CollectConfig(Config):
         if self.planned_by is not None and self.cluster is not None:
             raise ValueError("grasps are planned by this machine's processes alone: leave cluster out")
         if self.planned_by is not None and self.part_filter.bounds_success:
-            raise ValueError(
-                "part_filter.min_success and max_success are of random grasps: leave them out with planned_by"
-            )
+            raise ValueError(SUCCESS_IS_OF_RANDOM)
         self.camera.check_sees(REGION)
         return self
 

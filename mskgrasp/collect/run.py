@@ -9,8 +9,6 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from mskgrasp.collect.cluster import (
     check_cluster,
     connected,
@@ -19,11 +17,12 @@ from mskgrasp.collect.cluster import (
     wait_until_seen,
 )
 from mskgrasp.collect.config import CollectConfig
+from mskgrasp.collect.known_labels import check_labels, chosen_by, restorable
 from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
-from mskgrasp.dataset import ShardInfo, read_shard, read_success, shard_path
+from mskgrasp.dataset import read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
 from mskgrasp.dataset.shards import require_own_name, success_rate
 from mskgrasp.parts import Part, chosen_names, find_part
@@ -33,7 +32,7 @@ from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, process_count
 from mskgrasp.simulation.shard_task import ShardTask
-from mskgrasp.simulation.versions import SIMULATION_VERSION, other_versions
+from mskgrasp.simulation.versions import other_versions
 
 MOST_SHARDS = 200_000
 """Files of a dataset."""
@@ -44,15 +43,17 @@ def collect(config: CollectConfig) -> None:
     if config.cluster is not None:
         check_cluster(config.cluster)
     known = read_labels(config.labels)
-    planner = planner_digest(config, known)
+    planner = chosen_by(config, known)
     for one in known.values():
-        check_labels(one.info, config, planner)
+        check_labels(one.info, config)
     # Sets are stored as names of parts: a catalogue that grows must not change an existing dataset.
     names = chosen_names(config.parts or ("starter",))
     if config.sample:
         names = sampled(names, config.sample)
     config = config.model_copy(update={"parts": tuple(names), "sample": 0})
     parts = chosen_parts(config)
+    if planner and config.planned_by is None:
+        parts = restorable(parts, plan_shards(config, [part for _, part in parts]), known)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_size(config)
     check_out(config)
@@ -62,52 +63,6 @@ def collect(config: CollectConfig) -> None:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
             _collect(config, [part for _, part in parts], known, planner)
-
-
-def planner_digest(config: CollectConfig, known: Mapping[tuple[str, int], ShardLabels]) -> str:
-    """Digest of the model whose planner chooses the grasps, or chose those of the labels; empty: random ones.
-
-    Raises:
-        MissingModel: There is no model in the folder.
-        BadModel: It is damaged, or predicts no variance.
-    """
-    if config.planned_by is None:
-        return next((one.info.planner for one in known.values()), "")
-    from mskgrasp.simulation.planned_grasps import PlannedGrasps  # loads torch
-
-    return PlannedGrasps(config.planned_by).digest
-
-
-def check_labels(info: ShardInfo, config: CollectConfig, planner: str = "") -> None:
-    """Refuse labels of other settings, of another simulation, or of grasps that are chosen otherwise.
-
-    Args:
-        info: Of a shard of labels.
-        config: The run's settings.
-        planner: As `planner_digest`.
-
-    Raises:
-        BadDataset: They differ.
-    """
-    name = f"labels of shard {info.index} of part '{info.part}'"
-    settings = dict(
-        seed=config.seed,
-        physics=config.physics.model_dump(),
-        noise=config.noise.model_dump(mode="json"),
-        intrinsics=config.camera.intrinsics().tolist(),
-    )
-    changed = [key for key, value in settings.items() if np.asarray(getattr(info, key)).tolist() != value]
-    if info.T_base_camera.position[2] != config.camera.height:
-        changed.append("camera.height")
-    if info.planner != planner:
-        changed.append("the model of planned_by")
-    if changed:
-        raise BadDataset(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
-    if info.versions.get("simulation") != str(SIMULATION_VERSION):
-        raise BadDataset(
-            f"{name} are of simulation version {info.versions.get('simulation')}, not {SIMULATION_VERSION}: "
-            "collect them again"
-        )
 
 
 def check_size(config: CollectConfig) -> None:
@@ -144,17 +99,13 @@ def _collect(
     hashes = {part.name: part.content_hash for part in parts}
     # Another processor may round a part's mesh otherwise: its labels belong to that machine.
     other = sorted({name for (name, _), one in known.items() if one.info.part_hash != hashes.get(name)})
-    restored_only = planner and config.planned_by is None
     if other := [name for name in other if name in hashes]:
-        fate = "left out, as no model plans their grasps" if restored_only else "their grasps are simulated"
         note(
             f"{len(other)} of {len(parts)} parts are not exactly those of --labels ({', '.join(other[:3])}"
-            f"{', ...' if len(other) > 3 else ''}): {fate}"
+            f"{', ...' if len(other) > 3 else ''}): their grasps are simulated"
         )
     prepare_folder(config)
     tasks = plan_shards(config, parts)
-    if restored_only:
-        tasks = [task for task in tasks if task.part not in other and (task.part, task.index) in known]
     if config.part_filter.bounds_success:
         _make_missing(config, [task for task in tasks if task.index == 0], parts, known, planner)
         parts = passing_parts(config, parts)
@@ -308,7 +259,7 @@ def is_done(
         task: The shard.
         part_hash: Content hash of its part.
         labels: Its labels, where they are known: a shard made from them states the software that made them.
-        planner: As `planner_digest`.
+        planner: As `chosen_by`.
 
     Raises:
         BadDataset: The part, the simulation or the planner's model has changed since the shard was made.
@@ -339,7 +290,13 @@ def is_done(
             "another --out"
         )
     if info.planner != planner:
-        raise BadDataset(f"{path} holds grasps of another model's planner; choose another --out")
+        one, other = (
+            f"planner {digest[:8]}" if digest else "random grasps" for digest in (info.planner, planner)
+        )
+        raise BadDataset(
+            f"{path} was made with {one}, this run with {other}; choose another --out, or name the same "
+            "--planned-by or --labels"
+        )
     other = other_versions(info.versions)
     if other and (labels is None or labels.info.versions != info.versions):
         raise BadDataset(f"{path} was made by other software: {other}; choose another --out")

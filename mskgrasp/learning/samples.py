@@ -62,11 +62,12 @@ class Samples:
         swing: (n, 2) float32 swing of the part in the hand, radians about x and y of the grasp frame, NaN
             where the grasp failed.
         part: (n,) int64, index into ``parts``.
+        planned: (n,) bool, whether a planner chose the grasp; the others are random.
         parts: Names of the parts.
         skipped: Number of unusable attempts by reason: the planner would find no part in them either, or the
             part was not at rest.
         fingerprint: Hex digest of grasps and outcomes; equal digests mean equal data.
-        sources: Simulations and settings that the labels come from; of a sound dataset there is one.
+        sources: Simulations and settings that the labels come from; a sound dataset has one.
     """
 
     patches: Tensor
@@ -81,6 +82,7 @@ class Samples:
     grasp_displacement: Tensor
     swing: Tensor
     part: Tensor
+    planned: Tensor
     parts: tuple[str, ...]
     skipped: dict[str, int]
     fingerprint: str
@@ -137,6 +139,8 @@ class Samples:
     def joined(self, other: Samples) -> Samples:
         """Add the samples of another dataset at these parts; those of other parts are left out.
 
+        ``skipped`` and ``sources`` are those of both datasets as a whole.
+
         Raises:
             BadDataset: It has none of these parts.
         """
@@ -146,7 +150,7 @@ class Samples:
         ]
         rows = own >= 0
         if not rows.any():
-            raise BadDataset("no attempt of the second dataset is at a part of the first; collect some there")
+            raise BadDataset("no planned attempt is at a part of --data within success_range; collect some")
         arrays = {
             name: torch.cat([values, own[rows] if name == "part" else getattr(other, name)[rows]])
             for name, values in vars(self).items()
@@ -349,6 +353,7 @@ def _shard_samples(
         "displacement": displacement.astype(np.float32),
         "grasp_displacement": to_grasp_displacement(displacement, origin_grasp).astype(np.float32),
         "swing": swing_in_hand(before, after).astype(np.float32),
+        "planned": np.full(len(rows), bool(info.planner)),
     }, skipped
 
 

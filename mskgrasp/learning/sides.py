@@ -22,8 +22,9 @@ class Sides:
     Attributes:
         training: Rows to train on.
         validation: Rows that select the epoch and calibrate.
-        test: Rows of families that training never sees, for the final metrics only. Empty if parts are split
-            by name, or if none of them is ever lifted: no displacement can be measured on those.
+        test: Rows of random grasps at families that training never sees, for the final metrics only. Empty if
+            parts are split by name, or if none of them is ever lifted: no displacement can be measured on
+            those.
         new_sizes: The same for other sizes of families that training sees.
     """
 
@@ -60,6 +61,7 @@ def split(samples: Samples, config: LearningConfig) -> Sides:
             kind = "success" if n_success == 0 else "failure"
             raise BadDataset(f"no {kind} among the {n} attempts at the {name} parts; collect more attempts")
     for k, name in ((2, "test"), (3, "new_sizes")):
+        rows[k] = rows[k][~samples.planned[rows[k]]]
         if len(rows[k]) and not samples.success[rows[k]].any():
             note(f"warning: no success among the {len(rows[k])} attempts at the {name} parts; left out")
             rows[k] = rows[k][:0]

@@ -171,7 +171,9 @@ def train(
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=meta.model_copy(update={"calibration": found}))
-    stored = held_out.measure_models(models, samples, sides.training, sides.validation).to_json()
+    # Of random grasps, so that models can be compared whether they learned from planned ones or not.
+    random = sides.validation[~samples.planned[sides.validation]]
+    stored = held_out.measure_models(models, samples, sides.training, random).to_json()
     for side, rows in (("test", sides.test), ("new_sizes", sides.new_sizes)):
         if len(rows):
             stored[side] = held_out.measure_models(models, samples, sides.training, rows).to_json()

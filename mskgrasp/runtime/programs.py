@@ -54,7 +54,7 @@ GROUPS: dict[str, dict[str, Program]] = {
     "Data and networks of your own": {
         "collect": Program(
             "mskgrasp.collect",
-            "simulate random grasps of parts and record a dataset",
+            "simulate grasps of parts and record a dataset",
             "docs/collect.md",
             "mskgrasp.collect.config:CollectConfig",
         ),

@@ -1,18 +1,20 @@
 """Grasps of attempts that a planner chooses, in place of random ones.
 
-A planner picks the grasps of which its networks expect the most, so it also picks those in which they err in
-its favour. Attempts at its own choices show the networks these errors, of which random grasps hold few (the
-idea of DAgger: Ross, Gordon and Bagnell 2011, arXiv 1011.0686).
+A planner takes the grasps with the highest predictions, among them those whose predictions are too high.
+Random grasps hold few of these; attempts at the planner's own choices show them to the networks that learn
+next (the idea of DAgger: Ross, Gordon and Bagnell 2011, arXiv 1011.0686).
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
 
 from hal.camera import RgbdFrame
+from mskgrasp.core.errors import BadModel
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, load_models, require_model
@@ -24,6 +26,11 @@ N_CANDIDATES = 1600
 SHARES = {"recentred": 0.7, "low_variance": 0.15, "quality": 0.15}
 """Share of the attempts by each way of choosing: as a planner does by default, without recentred grasps, and
 by the best quality alone."""
+SETTINGS = {
+    "recentred": PlannerConfig(n_candidates=N_CANDIDATES),
+    "low_variance": PlannerConfig(n_candidates=N_CANDIDATES, recentre=False),
+    "quality": PlannerConfig(n_candidates=N_CANDIDATES, policy="quality"),
+}
 
 
 class PlannedGrasps:
@@ -37,14 +44,13 @@ class PlannedGrasps:
             BadModel: It is damaged, or predicts no variance.
         """
         models = load_models(folder)
-        settings = (
-            PlannerConfig(n_candidates=N_CANDIDATES),
-            PlannerConfig(n_candidates=N_CANDIDATES, recentre=False),
-            PlannerConfig(n_candidates=N_CANDIDATES, policy="quality"),
-        )
-        self._planners = [Planner(models, one, table_z=TABLE_Z, region=REGION) for one in settings]
+        if not models.meta.network.variance:
+            raise BadModel(
+                f"the model in {folder} predicts no variance, by which grasps are chosen; name another"
+            )
+        self._planners = [Planner(models, SETTINGS[name], table_z=TABLE_Z, region=REGION) for name in SHARES]
         self._ends = np.cumsum(list(SHARES.values()))[:-1]
-        self.digest = model_digest(folder)
+        self.digest = planner_digest(folder)
 
     def choose(
         self, depth: np.ndarray, intrinsics: np.ndarray, T_base_camera: Pose, rng: np.random.Generator
@@ -59,6 +65,7 @@ class PlannedGrasps:
 
         Raises:
             NoPartFound: No part is detected.
+            TableTooHigh: The table is seen too high.
         """
         planner = self._planners[int(np.searchsorted(self._ends, rng.random(), side="right"))]
         frame = RgbdFrame(
@@ -72,12 +79,13 @@ class PlannedGrasps:
         return planner.plan(frame, rng).grasp.as_vector()
 
 
-def model_digest(folder: Path) -> str:
-    """The first half of the SHA-256 of a model's description and weights, in hex.
+def planner_digest(folder: Path) -> str:
+    """Half of the SHA-256, in hex, of a model's files and of the settings of the planners with it.
 
     Raises:
         MissingModel: There is no model in the folder.
     """
     require_model(folder)
     files = b"".join((Path(folder) / name).read_bytes() for name in (DESCRIPTION, WEIGHTS))
-    return hashlib.sha256(files).hexdigest()[:32]
+    settings = [(name, share, SETTINGS[name].model_dump(mode="json")) for name, share in SHARES.items()]
+    return hashlib.sha256(files + json.dumps(settings).encode()).hexdigest()[:32]

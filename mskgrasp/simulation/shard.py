@@ -172,7 +172,10 @@ def _try(
     env: GraspDisplacementEnv, task: ShardTask, attempt: int, draw: int, planned: PlannedGrasps | None
 ) -> tuple[dict[str, np.ndarray], str]:
     """One attempt as a row of the shard, and the reason why it is not one; empty where it is."""
-    depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw, planned)
+    try:
+        depth, grasp = draw_attempt(env, task.part, task.seed, attempt, draw, planned)
+    except TableTooHigh:
+        return {}, "table_too_high"
     if grasp is None:
         return {}, "part_not_seen"
     outcome = env.try_grasp(torch.as_tensor(grasp, device=env.device))
@@ -203,13 +206,16 @@ def draw_attempt(
     Returns:
         The depth image (h, w), uint16 in 0.1 mm, and the grasp (1, 4), float32, base frame; None where the
         camera does not see the part.
+
+    Raises:
+        TableTooHigh: The table is seen too high for a planner.
     """
     depth, grasp_seed = capture_scene(env, part, seed, attempt, draw)
     rng = np.random.default_rng(grasp_seed)
     if planned is not None:
         try:
             chosen = planned.choose(u16_to_depth(depth), env.intrinsics, env.T_base_camera, rng)
-        except (NoPartFound, TableTooHigh):
+        except NoPartFound:
             return depth, None
         return depth, chosen[None].astype(np.float32)
     try:

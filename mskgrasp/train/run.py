@@ -20,6 +20,7 @@ from mskgrasp.core.json_text import finite
 from mskgrasp.dataset.fingerprint import dataset_fingerprint
 from mskgrasp.learning.compute_device import compute_device
 from mskgrasp.learning.grasp_models import DESCRIPTION, WEIGHTS, ModelMeta, read_meta, save_model
+from mskgrasp.learning.label_source import source_text
 from mskgrasp.learning.model_card import model_card
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, joined_fingerprint, read_samples
@@ -203,7 +204,35 @@ def _read(config: TrainConfig, data: Path) -> Samples:
             f"of the {len(usable)} parts only {kept.parts[0]} has a success in {low:g}..{high:g}, and "
             "validation needs another; widen success_range"
         )
-    return kept if config.planned is None else kept.joined(_read_dataset(config, config.planned))
+    if any(source.planner for source in samples.sources):
+        raise BadDataset(
+            f"{data} holds grasps that a planner chose: name it with --planned, random ones with --data"
+        )
+    return kept if config.planned is None else _with_planned(kept, config, config.planned)
+
+
+def _with_planned(samples: Samples, config: TrainConfig, folder: Path) -> Samples:
+    """Add the planned grasps of a dataset.
+
+    Raises:
+        BadDataset: Its grasps are random, or its simulation or settings are others.
+    """
+    planned = _read_dataset(config, folder)
+    if not all(source.planner for source in planned.sources):
+        raise BadDataset(f"{folder} holds random grasps: name it with --data, planned ones with --planned")
+    alike = {"seed": 0, "planner": ""}
+    known = [source.model_copy(update=alike) for source in samples.sources]
+    for source in planned.sources:
+        if source.model_copy(update=alike) not in known:
+            raise BadDataset(
+                f"{folder} was simulated otherwise than the random grasps: {source_text(source)}, not "
+                f"{'; '.join(map(source_text, samples.sources))}; collect both with the same settings"
+            )
+    joined = samples.joined(planned)
+    left = len(samples) + len(planned) - len(joined)
+    if left:
+        note(f"{left} of {len(planned)} planned attempts are left out: no random one is at their part")
+    return joined
 
 
 def _read_dataset(config: TrainConfig, folder: Path) -> Samples:

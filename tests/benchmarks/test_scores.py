@@ -28,7 +28,8 @@ def samples() -> Samples:
         centre_grasp=tensor(origin), origin_grasp=tensor(origin), quat_grasp_obj=torch.zeros((n, 4)),
         height=torch.full((n,), 0.02), success=success, displacement=tensor(moved),
         grasp_displacement=tensor(to_grasp_displacement(moved, origin)), swing=torch.zeros((n, 2)),
-        part=torch.arange(n) // EACH, parts=tuple(f"part_{k}" for k in range(N_PARTS)), skipped={},
+        part=torch.arange(n) // EACH, planned=torch.zeros(n, dtype=torch.bool),
+        parts=tuple(f"part_{k}" for k in range(N_PARTS)), skipped={},
         fingerprint="made",
     )  # fmt: skip
 

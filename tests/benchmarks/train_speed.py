@@ -111,6 +111,7 @@ def random_samples(config: LearningConfig, n: int) -> Samples:
         grasp_displacement=shift,
         swing=torch.zeros((n, 2)),
         part=torch.arange(n) % 20,
+        planned=torch.zeros(n, dtype=torch.bool),
         parts=tuple(f"part_{number}" for number in range(20)),
         skipped={},
         fingerprint="noise",

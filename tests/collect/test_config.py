@@ -41,12 +41,22 @@ SHIPPED = {path.stem: path for path in config_file("collect").glob("*.yaml")}
 @pytest.mark.parametrize("name", sorted(SHIPPED))
 def test_shipped_settings_are_of_production_physics_and_collect_into_a_folder_of_their_own(name: str):
     config = read_config(CollectConfig, SHIPPED[name])
-    assert config.parts == (() if name == "demo" else ("catalogue",))  # empty: the starter set
+    parts = {"demo": (), "planned": ("train", "validation")}  # empty: the starter set
+    assert config.parts == parts.get(name, ("catalogue",))
     assert config.attempts_per_part % config.shard_size == 0  # no shard of a few attempts
-    drawn = dict(friction_pad_part=(0.3, 0.8), finger_force=(30.0, 70.0)) if name == "training" else {}
+    learned = name in ("training", "planned")
+    drawn = dict(friction_pad_part=(0.3, 0.8), finger_force=(30.0, 70.0)) if learned else {}
     assert config.physics == Physics() and config.noise == ExecutionNoise(**drawn)
     others = [read_config(CollectConfig, path).out for stem, path in SHIPPED.items() if stem != name]
     assert config.out not in others
+
+
+def test_planned_grasps_are_of_other_scenes_than_random_ones_and_of_no_test_part():
+    random, planned = (read_config(CollectConfig, SHIPPED[name]) for name in ("training", "planned"))
+    assert random.seed != planned.seed and random.camera == planned.camera
+    assert planned.planned_by == Path("mskgrasp/learning/pretrained") and random.planned_by is None
+    lengths = [(one.part_filter.min_length, one.part_filter.max_length) for one in (random, planned)]
+    assert lengths[0] == lengths[1] and not planned.part_filter.bounds_success
 
 
 def test_the_paper_s_settings_are_those_of_the_paper():

@@ -29,6 +29,7 @@ from mskgrasp.parts import store
 from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.solid import Solid
 from mskgrasp.parts.write_solid import write_solid
+from mskgrasp.simulation.planned_grasps import planner_digest
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
 from tests.programs import run_here
@@ -69,6 +70,19 @@ def test_other_settings_are_refused_for_an_existing_dataset(collected):
     done = run_here(main, *arguments(collected, "--seed", "6"))
     assert done.returncode == 2
     assert "seed differ" in done.stderr and len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_grasps_are_planned_alike_by_one_worker_and_by_two(tmp_path):
+    planned = ("--planned-by", str(PRETRAINED))
+    for n in ("1", "2"):
+        done = collect(tmp_path / n / "data", *planned, "--workers", n)
+        assert done.returncode == 0, done.stderr
+    assert_equal(tmp_path / "1" / "data", tmp_path / "2" / "data")
+    infos = [read_shard(path)[1] for path in list_shards(tmp_path / "1" / "data")]
+    assert {info.planner for info in infos} == {planner_digest(PRETRAINED)}
+    done = run_here(main, *arguments(tmp_path / "1" / "data"))
+    assert done.returncode == 2 and "planned_by differ" in done.stderr
 
 
 def workers(pid: int) -> list[int]:
@@ -154,7 +168,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected
         ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 1, "no part is left"),
         ("planned_by: /nowhere\nparts: [hex_nut_m30]", 2, "no model.json in /nowhere; train a model"),
         ("planned_by: /nowhere\ncluster: auto", 2, "grasps are planned by this machine's processes alone"),
-        ("planned_by: /nowhere\npart_filter: {min_success: 0.1}", 2, "are of random grasps: leave them out"),
+        ("planned_by: /nowhere\npart_filter: {min_success: 0.1}", 2, "these are planned: leave them out"),
     ],
 )
 def test_a_wrong_configuration_is_one_line_that_names_it(tmp_path, text, code, message):
@@ -210,28 +224,8 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
         file.attrs["fidelity"] = "gpu"
     with pytest.raises(BadDataset, match="labels of fidelity 'gpu'"):
         is_done(out, task, info.part_hash)
-    with pytest.raises(BadDataset, match="holds grasps of another model's planner"):
+    with pytest.raises(BadDataset, match=r"made with random grasps, this run with planner 0123; .*--labels"):
         is_done(collected, task, info.part_hash, planner="0123")
-
-
-def test_labels_of_planned_grasps_need_no_model_and_make_no_random_grasps(collected, tmp_path):
-    """As if a planner had chosen the grasps of a dataset that lacks one of its shards."""
-    before = Path(shutil.copytree(collected, tmp_path / "before"))
-    for path in list_shards(before):
-        with h5py.File(path, "r+") as file:
-            file.attrs["planner"] = "0123"
-    list_shards(before)[-1].unlink()
-    export_labels(before, tmp_path / "planned.labels")
-    done = run_here(main, *arguments(tmp_path / "data", "--labels", str(tmp_path / "planned.labels")))
-    assert done.returncode == 0, done.stderr
-    made = list_shards(tmp_path / "data")
-    assert [path.name for path in made] == [path.name for path in list_shards(before)]
-    assert all(read_shard(path)[1].planner == "0123" for path in made)
-    done = run_here(
-        main, *arguments(tmp_path / "other", "--labels", str(tmp_path / "planned.labels")),
-        "--planned-by", str(PRETRAINED),
-    )  # fmt: skip
-    assert done.returncode == 1 and "other settings (the model of planned_by differ)" in done.stderr
 
 
 def test_a_collection_from_labels_of_other_software_is_resumed_with_them(collected, tmp_path):

@@ -351,6 +351,7 @@ def test_a_shard_with_too_few_attempts_is_named(data):
         ("fidelity", "gpu"),
         ("hand", '{"pad_width": 0.02}'),
         ("noise", '{"finger_force": [5.0, 70.0]}'),
+        ("planner", "0123"),
         ("family", "spoon"),
     ],
 )

@@ -48,6 +48,26 @@ def test_wrong_names_and_places_are_usage_errors(collected, tmp_path):
 
 
 @pytest.mark.parametrize("export", [export_npz, export_maniskill])
+def test_planned_grasps_are_not_exported_beside_random_ones_and_are_called_so(tmp_path, export):
+    folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=2, n_attempts=3, seed=0)
+    out = tmp_path / "out" / ("x.npz" if export is export_npz else "x.h5")
+    for path in list_shards(folder):
+        with h5py.File(path, "r+") as file:
+            file.attrs["physics"] = '{"lift_height": 0.1}'
+    for k, path in enumerate(list_shards(folder)):
+        with h5py.File(path, "r+") as file:
+            file.attrs["planner"] = "0123"
+        if k == 0:
+            with pytest.raises(BadDataset, match="planner differs"):
+                export(folder, out)
+    export(folder, out)
+    if export is export_npz:
+        assert str(np.load(out)["planner"]) == "0123"
+    else:
+        assert "chosen by planner 0123" in json.loads(out.with_suffix(".json").read_text())["source_desc"]
+
+
+@pytest.mark.parametrize("export", [export_npz, export_maniskill])
 def test_a_bad_shard_stops_an_export_and_leaves_nothing_behind(tmp_path, export):
     folder = synthetic.write_dataset(tmp_path / "boxes", n_parts=2, n_attempts=3, seed=0)
     path = list_shards(folder)[1]

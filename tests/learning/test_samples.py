@@ -113,7 +113,7 @@ def test_planned_attempts_join_those_of_the_same_parts(dataset, tmp_path):
     assert joined.fingerprint == joined_fingerprint(kept.fingerprint, other.fingerprint)
     assert joined.fingerprint != other.joined(kept).fingerprint
     foreign = dataclasses.replace(other, parts=tuple(f"other_{name}" for name in other.parts))
-    with pytest.raises(BadDataset, match="no attempt of the second dataset is at a part of the first"):
+    with pytest.raises(BadDataset, match="no planned attempt is at a part of --data"):
         kept.joined(foreign)
 
 

@@ -39,6 +39,10 @@ def test_a_model_tells_its_labels_and_warns_of_a_cell_unlike_theirs(capsys):
     assert "model: labels of simulation version 4" in out and not warned
     tell_model(told, replace(cell, physics=Physics(friction_pad_part=0.9)))
     assert "here friction_pad_part 0.9, not 0.5" in capsys.readouterr().err
+    twice = told.meta.model_copy(update={"labels": (source, source.model_copy(update={"planner": "0123"}))})
+    tell_model(replace(told, meta=twice), replace(cell, physics=Physics(friction_pad_part=0.9)))
+    out, warned = capsys.readouterr()
+    assert out.count("model: labels of") == 2 and warned.count("warning") == 1
     high = told.meta.model_copy(update={"labels": (source.model_copy(update={"camera_height": 1.2}),)})
     tell_model(replace(told, meta=high), cell)
     assert "camera 0.80 m over the table, not 1.20" in capsys.readouterr().err

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from hal.camera import RgbdFrame
-from mskgrasp.core.errors import MissingModel, NoPartFound
+from mskgrasp.core.errors import BadModel, MissingModel, NoPartFound
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.dataset import list_shards, read_shard
 from mskgrasp.dataset.labels import export_labels, read_labels
-from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.learning.grasp_models import ModelMeta, build_models, load_models, save_model
+from mskgrasp.learning.network_config import HandNetworkConfig, Normalisation
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.planner import Planner
-from mskgrasp.simulation.planned_grasps import N_CANDIDATES, SHARES, PlannedGrasps, model_digest
+from mskgrasp.simulation.planned_grasps import N_CANDIDATES, SHARES, PlannedGrasps, planner_digest
 from mskgrasp.simulation.shard import Simulator
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.synthetic import INTRINSICS, OVERHEAD, Box, render
@@ -61,16 +62,30 @@ def test_an_empty_table_has_no_grasp(planned: PlannedGrasps):
         planned.choose(render([]).astype(np.float32), INTRINSICS, OVERHEAD, np.random.default_rng(0))
 
 
-def test_the_digest_is_of_the_description_and_the_weights(planned: PlannedGrasps, tmp_path: Path):
-    assert planned.digest == model_digest(PRETRAINED) and len(planned.digest) == 32
+def test_the_digest_is_of_description_weights_and_settings(
+    planned: PlannedGrasps, tmp_path: Path, monkeypatch
+):
+    assert planned.digest == planner_digest(PRETRAINED) and len(planned.digest) == 32
     for name in ("model.json", "model.safetensors"):
         folder = tmp_path / name
         shutil.copytree(PRETRAINED, folder)
-        assert model_digest(folder) == planned.digest
+        assert planner_digest(folder) == planned.digest
         (folder / name).write_bytes((folder / name).read_bytes() + b" ")
-        assert model_digest(folder) != planned.digest
+        assert planner_digest(folder) != planned.digest
+    monkeypatch.setitem(SHARES, "quality", 0.2)
+    assert planner_digest(PRETRAINED) != planned.digest
     with pytest.raises(MissingModel, match="train a model"):
-        model_digest(tmp_path)
+        planner_digest(tmp_path)
+
+
+def test_a_model_without_variances_chooses_no_grasps(tmp_path: Path):
+    network = HandNetworkConfig(variance=False)
+    numbers = Normalisation(
+        action_scale=(0.05,) * 3, target_mean=(0.0,) * 4, target_std=(0.01,) * 4, base_rate=0.3
+    )
+    save_model(tmp_path, build_models(ModelMeta(network=network, normalisation=numbers)))
+    with pytest.raises(BadModel, match="predicts no variance, by which grasps are chosen; name another"):
+        PlannedGrasps(tmp_path)
 
 
 def test_a_shard_of_planned_grasps_is_made_again_without_their_model(tmp_path: Path):
@@ -79,7 +94,7 @@ def test_a_shard_of_planned_grasps_is_made_again_without_their_model(tmp_path: P
     yields = list(made.write(task, tmp_path / "one"))
     made.close()
     attempts, info = read_shard(list_shards(tmp_path / "one")[0])
-    assert info.planner == model_digest(PRETRAINED) and yields == [1, 1, 1]
+    assert info.planner == planner_digest(PRETRAINED) and yields == [1, 1, 1]
     export_labels(tmp_path / "one", tmp_path / "one.labels")
     again = Simulator(Physics(), Overhead(), ExecutionNoise())
     list(again.restore(task, read_labels([tmp_path / "one.labels"])[PART, 0], tmp_path / "two"))

@@ -1,6 +1,8 @@
 import csv
 import dataclasses
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,19 +97,46 @@ def test_a_finished_training_is_not_taken_for_that_of_other_data(dataset, tmp_pa
         train.run_training(few.model_copy(update={"data": other}))
 
 
+def planned_boxes(folder: Path, n_parts: int = 8, **changes: Any) -> Path:
+    """A dataset of boxes as if a planner had chosen its grasps."""
+    synthetic.write_dataset(folder, n_parts=n_parts, n_attempts=10, seed=3)
+    for path in list_shards(folder):
+        attempts, info = read_shard(path)
+        write_shard(path, attempts, dataclasses.replace(info, **({"planner": "0123"} | changes)))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("swap", "changes", "message"),
+    [
+        (True, {}, "holds grasps that a planner chose: name it with --planned, random ones with --data"),
+        (
+            False,
+            {"planner": ""},
+            "holds random grasps: name it with --data, planned ones with --planned",
+        ),
+        (False, {"fidelity": "gpu"}, "was simulated otherwise than the random grasps: .*fidelity gpu"),
+        (False, {"noise": {"friction_pad_part": [0.3, 0.8]}}, "friction_pad_part 0.3 to 0.8"),
+    ],
+)
+def test_datasets_that_do_not_belong_together_are_not_learned(dataset, tmp_path, swap, changes, message):
+    pair = dataset, planned_boxes(tmp_path / "planned", **changes)
+    data, planned = pair[::-1] if swap else pair
+    with pytest.raises(BadDataset, match=message):
+        train.run_training(program(SHORT, data=data, planned=planned, out=tmp_path / "model", epochs=1))
+    assert not (tmp_path / "model").exists()
+
+
 @pytest.mark.slow
 def test_planned_grasps_are_learned_beside_random_ones_and_named_in_the_model(dataset, tmp_path):
-    planned = synthetic.write_dataset(tmp_path / "planned", n_parts=8, n_attempts=10, seed=3)
-    for path in list_shards(planned):
-        attempts, info = read_shard(path)
-        write_shard(path, attempts, dataclasses.replace(info, planner="0123"))
-    out = tmp_path / "model"
+    planned, out = planned_boxes(tmp_path / "planned"), tmp_path / "model"
     both = program(SHORT, data=dataset, planned=planned, out=out, epochs=1)
     assert train.run_training(both) == 0
     meta = load_models(out).meta
     assert meta.training["attempts"] == 7 * (80 + 10)
     assert {source.planner for source in meta.labels} == {"", "0123"}
     assert "grasps chosen by a planner" in (out / "card.md").read_text()
+    assert meta.metrics["gqn"]["n"] == 80  # random ones alone
     assert train.run_training(both) == 0  # finished, and of the same data
     with pytest.raises(UsageError, match=f"trained on other data than {dataset}; choose"):
         train.run_training(both.model_copy(update={"planned": None}))

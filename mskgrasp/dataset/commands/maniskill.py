@@ -64,6 +64,7 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
                 )
 
     height = float(info.T_base_camera.position[2]) - info.table_z
+    grasps = f"grasps chosen by planner {info.planner}" if info.planner else "random grasps"
     camera = dict(height=height, focal_px=float(info.intrinsics[0, 0]), n_pixels=int(size[0]))
     with renamed_at_the_end(out.parent, files) as temporary:
         return write_trajectories(
@@ -78,7 +79,7 @@ def export_maniskill(folder: Path, out: Path, watch: Watch = iter) -> int:
             ),
             intrinsics=info.intrinsics,
             T_base_camera=info.T_base_camera,
-            description="random grasps of mskgrasp.collect, one a trajectory",
+            description=f"{grasps}, of mskgrasp.collect, one a trajectory",
         )
 
 
