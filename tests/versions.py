@@ -34,6 +34,7 @@ SIMULATION = (
     "mskgrasp/core/seeds.py",
     "mskgrasp/parts/hulls.py",
     "mskgrasp/parts/resting_pose.py",
+    "mskgrasp/perception/depth_noise.py",
     "mskgrasp/perception/part_detection.py",
     "mskgrasp/simulation/shard.py",
 )

@@ -13,6 +13,7 @@ import torch
 from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.geometry import Array, Pose, quat_to_matrix
 from mskgrasp.core.grasp import PartView
+from mskgrasp.perception.depth_noise import QUIET, coarse_step, pixel_noise
 
 REGION_MARGIN = 0.05
 """Greatest reach of a part in the region beyond it, metres."""
@@ -22,11 +23,6 @@ ALONE = 0.2
 """Share of the part's pixels above which another group in the region is another part."""
 MIN_PIXELS = 5
 """Smaller groups of pixels are specks: an M3 nut covers 6 pixels of 2.2 mm."""
-QUIET = 0.0003
-"""Deviation of the heights above which an image is noisy, metres; one stored in 0.1 mm has up to 0.03."""
-COARSE, COARSEST = 0.0002, 0.005
-"""Least and greatest step of depth that is coarse, metres: medians of noise of less than half a step are 0.
-Cameras deliver whole millimetres, for example; an image stored in 0.1 mm is exact."""
 LINK_DEVIATIONS = 4.0
 """A smoothed pixel rises by chance, at a Gaussian's tail, once in 30 000 by more."""
 MEAN_NOISE = 0.28
@@ -105,8 +101,8 @@ def find_part_pixels(
             "camera does not see it, or measures nothing there; check the region, the camera's pose, its "
             "range and its exposure"
         )
-    table_offset, step = 0.0, _coarse_step(depth, near)
-    noise = _noise(heights, near, step)
+    table_offset, step = 0.0, coarse_step(depth, near)
+    noise = pixel_noise(heights, near, step)
     if noise > QUIET:
         min_height = max(min_height, noise)
         tops = _median(heights)
@@ -264,50 +260,6 @@ def _checked(depth: np.ndarray) -> np.ndarray:
             "convert it from millimetres first"
         )
     return depth if n_valid == depth.size else np.where(valid, depth, np.nan)
-
-
-def _coarse_step(depth: np.ndarray, near: np.ndarray) -> float:
-    """Find the step in which depth comes; 0 if it is not coarse, or no noise moves pixels by a step."""
-    changes, both = _steps(depth[::4], near[::4])
-    changed = changes[both & (changes > 0)]
-    step = float(changed.min(initial=np.inf))
-    if not COARSE < step < COARSEST:
-        return 0.0
-    n_steps = np.rint(changed / step)
-    # In an exact image only edges differ by a whole number of steps, by chance.
-    often = np.count_nonzero(n_steps == 1) > 0.02 * np.count_nonzero(both)
-    return step if often and np.abs(changed / step - n_steps).max() < 0.1 else 0.0
-
-
-def deviation_of_steps(offsets: np.ndarray, step: float) -> float:
-    """Estimate the standard deviation of offsets (n,) that come in steps, metres, without those of edges."""
-    sizes = np.abs(offsets)
-    kept = sizes[sizes <= 4 * max(step, 1.4826 * float(np.median(sizes)))]
-    return float(np.sqrt((kept**2).mean()))
-
-
-def _noise(heights: np.ndarray, near: np.ndarray, step: float) -> float:
-    """Estimate the standard deviation of a pixel's noise from the steps between neighbours.
-
-    Most of them are on the table. 0 if it is less than `QUIET`.
-    """
-    # The median step is 0.6745 deviations of a step, which is sqrt(2) those of a pixel.
-    deviations = 0.6745 * math.sqrt(2)
-    few, fewer = _steps(heights[::4], near[::4])
-    if not step and 4 * np.count_nonzero((few > QUIET * deviations) & fewer) < np.count_nonzero(fewer):
-        return 0.0  # far from half of them: a quarter of the rows suffices
-    steps, both = _steps(heights, near)
-    if not both.any():
-        return 0.0
-    noise = float(np.median(steps[both])) / deviations
-    if step:  # rounding alone deviates by step / sqrt(12)
-        noise = max(deviation_of_steps(steps[both], step) / math.sqrt(2), step / math.sqrt(12))
-    return noise if noise > QUIET else 0.0
-
-
-def _steps(heights: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the steps (h, w - 1) between neighbours of a row, and whether both are near."""
-    return np.abs(np.diff(heights, axis=1)), near[:, 1:] & near[:, :-1]
 
 
 def _median(heights: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.grasp import PartView
 from mskgrasp.dataset import ShardInfo, list_shards, u16_to_depth
 from mskgrasp.dataset.shards import read_columns
+from mskgrasp.perception import depth_noise
 from mskgrasp.perception import part_detection as finding
 from mskgrasp.runtime.console_table import Table
 from tests.benchmarks.report import show
@@ -44,8 +45,11 @@ def main() -> None:
             add_noise(depth, info.intrinsics, SensorNoise(model=model), np.random.default_rng(k))
             for k, (depth, info) in enumerate(images)
         ]
-        for method, quiet, height in (("a pixel by itself", np.inf, 0.006), ("ours", finding.QUIET, 0.003)):
-            with patch.object(finding, "QUIET", quiet):
+        for method, quiet, height in (
+            ("a pixel by itself", np.inf, 0.006),
+            ("ours", depth_noise.QUIET, 0.003),
+        ):
+            with patch.object(depth_noise, "QUIET", quiet):
                 seen = [view(d, info, height) for d, (_, info) in zip(noisy, images, strict=True)]
             for kind, chosen in (("narrow", narrow), ("other", ~narrow)):
                 rows.append((model, method, kind, *errors(seen, exact, chosen)))

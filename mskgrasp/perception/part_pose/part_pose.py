@@ -11,7 +11,8 @@ from scipy.special import ndtr
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import PartNotRecognised
 from mskgrasp.core.geometry import Pose
-from mskgrasp.perception.part_detection import FoundPart, deviation_of_steps, find_part_pixels
+from mskgrasp.perception.depth_noise import deviation_of_steps
+from mskgrasp.perception.part_detection import FoundPart, find_part_pixels
 from mskgrasp.perception.part_pose.known_part import KnownPart
 from mskgrasp.perception.part_pose.likelihood import Seen
 from mskgrasp.perception.part_pose.mismatch import Mismatch, reason_to_refuse
