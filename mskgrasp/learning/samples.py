@@ -165,9 +165,9 @@ class Samples:
         )
 
 
-def joined_fingerprint(*fingerprints: str) -> str:
-    """Digest of several datasets that are learned together, from that of each."""
-    return hashlib.sha256("".join(fingerprints).encode()).hexdigest()
+def joined_fingerprint(one: str, other: str) -> str:
+    """Digest of two datasets that are learned together, from that of each."""
+    return hashlib.sha256(f"{one}{other}".encode()).hexdigest()
 
 
 def read_samples(

@@ -24,9 +24,9 @@ class TrainConfig(LearningConfig):
     transfer: Annotated[StageConfig | None, tyro.conf.AvoidSubcommands] = None
     data: Path | None = None
     """The dataset folder."""
-    planned: Path | None = None
-    """A further dataset at the same parts, of grasps that a planner chose (collect's planned_by);
-    success_range is that of ``data`` alone."""
+    planned: tuple[Path, ...] = ()
+    """Further datasets at the same parts, of grasps that a planner chose (collect's planned_by);
+    success_range selects parts by ``data`` alone."""
     out: Path | None = None
     """The model's folder. A run that was interrupted resumes when it is started again in the same way."""
     epochs: int | None = Field(default=None, ge=1)

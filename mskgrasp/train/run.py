@@ -8,7 +8,7 @@ import json
 import math
 import sys
 from contextlib import closing
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 
 import torch
@@ -99,7 +99,7 @@ def run_training(config: TrainConfig) -> int:
     out = config.out
     _check_out(config, out)
     if (out / DESCRIPTION).exists() and (out / WEIGHTS).exists():
-        _check_trained_on([config.data, *([config.planned] if config.planned else [])], out)
+        _check_trained_on([config.data, *config.planned], out)
         (out / CHECKPOINT).unlink(missing_ok=True)
         print(f"{out} is trained already; choose another --out to train again")
         return 0
@@ -172,7 +172,7 @@ def _check_trained_on(data: list[Path], out: Path) -> None:
         dataset_fingerprint(folder, lambda paths: progress(paths, title="compare data", unit="shard"))
         for folder in data
     ]
-    if known not in (None, joined_fingerprint(*found) if len(found) > 1 else found[0]):
+    if known not in (None, reduce(joined_fingerprint, found)):
         raise UsageError(
             f"{out} holds a model that was trained on other data than {' and '.join(map(str, data))}; choose "
             "another --out"
@@ -208,7 +208,9 @@ def _read(config: TrainConfig, data: Path) -> Samples:
         raise BadDataset(
             f"{data} holds grasps that a planner chose: name it with --planned, random ones with --data"
         )
-    return kept if config.planned is None else _with_planned(kept, config, config.planned)
+    for folder in config.planned:
+        kept = _with_planned(kept, config, folder)
+    return kept
 
 
 def _with_planned(samples: Samples, config: TrainConfig, folder: Path) -> Samples:
@@ -220,6 +222,8 @@ def _with_planned(samples: Samples, config: TrainConfig, folder: Path) -> Sample
     planned = _read_dataset(config, folder)
     if not all(source.planner for source in planned.sources):
         raise BadDataset(f"{folder} holds random grasps: name it with --data, planned ones with --planned")
+    if any(source in samples.sources for source in planned.sources):
+        raise BadDataset(f"{folder} has planner and seed of another --planned dataset; name each once")
     alike = {"seed": 0, "planner": ""}
     known = [source.model_copy(update=alike) for source in samples.sources]
     for source in planned.sources:

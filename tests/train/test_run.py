@@ -123,14 +123,14 @@ def test_datasets_that_do_not_belong_together_are_not_learned(dataset, tmp_path,
     pair = dataset, planned_boxes(tmp_path / "planned", **changes)
     data, planned = pair[::-1] if swap else pair
     with pytest.raises(BadDataset, match=message):
-        train.run_training(program(SHORT, data=data, planned=planned, out=tmp_path / "model", epochs=1))
+        train.run_training(program(SHORT, data=data, planned=(planned,), out=tmp_path / "model", epochs=1))
     assert not (tmp_path / "model").exists()
 
 
 @pytest.mark.slow
 def test_planned_grasps_are_learned_beside_random_ones_and_named_in_the_model(dataset, tmp_path):
     planned, out = planned_boxes(tmp_path / "planned"), tmp_path / "model"
-    both = program(SHORT, data=dataset, planned=planned, out=out, epochs=1)
+    both = program(SHORT, data=dataset, planned=(planned,), out=out, epochs=1)
     assert train.run_training(both) == 0
     meta = load_models(out).meta
     assert meta.training["attempts"] == 7 * (80 + 10)
@@ -138,8 +138,10 @@ def test_planned_grasps_are_learned_beside_random_ones_and_named_in_the_model(da
     assert "grasps chosen by a planner" in (out / "card.md").read_text()
     assert meta.metrics["gqn"]["n"] == 80  # random ones alone
     assert train.run_training(both) == 0  # finished, and of the same data
+    with pytest.raises(BadDataset, match="planner and seed of another --planned dataset; name each once"):
+        train.run_training(both.model_copy(update={"planned": (planned, planned), "out": tmp_path / "twice"}))
     with pytest.raises(UsageError, match=f"trained on other data than {dataset}; choose"):
-        train.run_training(both.model_copy(update={"planned": None}))
+        train.run_training(both.model_copy(update={"planned": ()}))
 
 
 def test_a_checkpoint_of_other_data_keeps_the_settings_that_go_on_with_it(dataset, tmp_path, monkeypatch):
