@@ -76,12 +76,12 @@ def test_other_settings_are_refused_for_an_existing_dataset(collected):
 def test_grasps_are_planned_alike_by_one_worker_and_by_two(tmp_path):
     planned = ("--planned-by", str(PRETRAINED))
     for n in ("1", "2"):
-        done = collect(tmp_path / n / "data", *planned, "--workers", n)
+        done = collect(tmp_path / n, *planned, "--workers", n)
         assert done.returncode == 0, done.stderr
-    assert_equal(tmp_path / "1" / "data", tmp_path / "2" / "data")
-    infos = [read_shard(path)[1] for path in list_shards(tmp_path / "1" / "data")]
+    assert_equal(tmp_path / "1", tmp_path / "2")
+    infos = [read_shard(path)[1] for path in list_shards(tmp_path / "1")]
     assert {info.planner for info in infos} == {planner_digest(PRETRAINED)}
-    done = run_here(main, *arguments(tmp_path / "1" / "data"))
+    done = run_here(main, *arguments(tmp_path / "1"))
     assert done.returncode == 2 and "planned_by differ" in done.stderr
 
 
