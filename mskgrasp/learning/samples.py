@@ -6,10 +6,9 @@ import contextlib
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import torch
@@ -29,7 +28,6 @@ from mskgrasp.dataset.fingerprint import OUTCOMES
 from mskgrasp.dataset.shards import require_own_name
 from mskgrasp.learning.label_source import LabelSource, distinct, source_of
 from mskgrasp.learning.network_config import NetworkConfig
-from mskgrasp.parts.catalogue import SPLITS, Split, read_index, splits_of
 from mskgrasp.perception.height_patches import crop_patches, height_image
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.runtime.worker_pool import Work, process_count, results
@@ -355,62 +353,3 @@ def _shard_samples(
         "swing": swing_in_hand(before, after).astype(np.float32),
         "planned": np.full(len(rows), bool(info.planner)),
     }, skipped
-
-
-def part_sides(parts: tuple[str, ...], fraction: float, by: Literal["name", "catalogue"]) -> dict[str, Split]:
-    """Assign each part to a side of the split.
-
-    Training and validation get one at least: where one of them would be empty, it takes a part of training,
-    or one that the name puts on validation; never a part that the catalogue holds out. A part keeps its side
-    when other parts join the dataset, unless it was taken so.
-
-    Args:
-        parts: Names.
-        fraction: Share of validation parts, for a split by name.
-        by: name: a hash of the part's name; catalogue: the catalogue's split, which holds out whole families,
-            those of parts that are not built on this machine, too, and the name for parts without a recipe.
-
-    Raises:
-        BadDataset: There are fewer than two parts, no catalogue, or no part that training or validation can
-            take.
-    """
-    if len(parts) < 2:
-        raise BadDataset(
-            f"the dataset has one part ({', '.join(parts)}), validation needs another that training never "
-            "sees; collect at least 2 parts"
-        )
-    sides: dict[str, Split] = {
-        name: "validation" if _name_hash(name) < fraction else "train" for name in parts
-    }
-    of_catalogue: dict[str, Split] = {}
-    if by == "catalogue":
-        index = read_index()
-        if not index.parts:
-            raise BadDataset(
-                "sides: catalogue needs the catalogue: python -m mskgrasp.parts build --catalogue"
-            )
-        of_catalogue = splits_of(parts, index)
-        sides |= of_catalogue
-    order = sorted(parts, key=_name_hash)
-    needed: dict[Split, list[str]] = {"validation": order, "train": order[::-1]}
-    for side, candidates in needed.items():
-        count = Counter(sides.values())
-        if not count[side]:
-            spare = [name for name in candidates if _is_spare(sides[name], count, name in of_catalogue)]
-            if not spare:
-                found = ", ".join(f"{count[one]} {one}" for one in SPLITS if count[one])
-                raise BadDataset(
-                    f"no part is left for {side} (by the catalogue: {found}); "
-                    f"collect parts of --parts {side}, too"
-                )
-            sides[spare[0]] = side
-    return sides
-
-
-def _is_spare(side: Split, count: Mapping[Split, int], in_catalogue: bool) -> bool:
-    """Whether a part of a side can be given to training or validation, of which one has none."""
-    return count[side] > 1 and (side == "train" or (side == "validation" and not in_catalogue))
-
-
-def _name_hash(name: str) -> float:
-    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") / 2**64

@@ -25,8 +25,8 @@ from mskgrasp.learning.grasp_models import ModelMeta, Models, build_models
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.network_config import Normalisation
 from mskgrasp.learning.networks import GraspQualityNetwork
-from mskgrasp.learning.samples import SAMPLES_VERSION, Samples, part_sides
-from mskgrasp.learning.sides import Sides, split
+from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
+from mskgrasp.learning.sides import Sides, part_sides, split
 from mskgrasp.learning.stage import Reporter, Stage
 from mskgrasp.parts.catalogue import SPLITS
 

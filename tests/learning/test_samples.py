@@ -7,10 +7,7 @@ import torch
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.dataset import list_shards, read_shard
-from mskgrasp.learning.samples import joined_fingerprint, part_sides, read_samples
-from mskgrasp.parts import build_part
-from mskgrasp.parts.catalogue import Index, entry_of, make_index, split_of, write_index
-from mskgrasp.parts.recipes import cad, families
+from mskgrasp.learning.samples import joined_fingerprint, read_samples
 from tests import synthetic
 from tests.learning.small import HAND, PATCH
 
@@ -43,10 +40,6 @@ def test_the_target_is_the_hands_motion_seen_from_the_part_whatever_centre_was_s
     assert float((samples.origin_grasp - samples.centre_grasp)[:, :2].norm(dim=1).max()) > 3e-4
 
 
-def held_out_of(names: tuple[str, ...], fraction: float) -> set[str]:
-    return {name for name, side in part_sides(names, fraction, "name").items() if side == "validation"}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("image", ["grasp", "object"])
 def test_several_processes_read_the_same_samples(dataset, image):
@@ -70,17 +63,6 @@ def test_a_damaged_shard_is_named_by_any_number_of_readers(tmp_path, workers):
     bad.write_bytes(bad.read_bytes()[:500])
     with pytest.raises(BadDataset, match=bad.name):
         read_samples(dataset, PATCH.network, workers=workers)
-
-
-def test_parts_are_split_by_name_and_stay_on_their_side():
-    names = tuple(f"part_{k}" for k in range(400))
-    held_out = held_out_of(names, 0.2)
-    assert 50 < len(held_out) < 110
-    fewer = names[:200]
-    assert held_out_of(fewer, 0.2) == held_out & set(fewer)
-    assert all(len(held_out_of(("a", "b"), share)) == 1 for share in (0.01, 0.99))
-    with pytest.raises(BadDataset, match="at least 2 parts"):
-        part_sides(("lonely",), 0.2, "name")
 
 
 def test_parts_outside_the_success_range_are_left_out(dataset):
@@ -115,64 +97,6 @@ def test_planned_attempts_join_those_of_the_same_parts(dataset, tmp_path):
     foreign = dataclasses.replace(other, parts=tuple(f"other_{name}" for name in other.parts))
     with pytest.raises(BadDataset, match="no planned attempt is at a part of --data"):
         kept.joined(foreign)
-
-
-def test_the_catalogue_decides_the_sides_where_it_is_asked_to(monkeypatch, tmp_path):
-    names = tuple(f"part_{k}" for k in range(6))
-    with pytest.raises(BadDataset, match="build --catalogue"):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        part_sides(names, 0.2, "catalogue")
-
-
-def test_parts_that_were_not_built_here_are_on_the_side_of_their_family(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    write_index(make_index([entry_of(build_part("washer_m36").name)], {}, Index(parts={}, left_out={})))
-    drawn = {recipe.name: split_of(recipe.family, "group 0") for recipe in cad.recipes()}
-    sides = part_sides(("washer_m36", *drawn), 0.2, "catalogue")
-    assert sides["washer_m36"] == split_of("washer", "washer_m36")
-    for side in ("test", "validation"):
-        assert {name for name in drawn if sides[name] == side} == {
-            n for n, one in drawn.items() if one == side
-        }
-
-
-@pytest.fixture(scope="module")
-def named(tmp_path_factory):
-    """Names of parts by their side of the catalogue, of which one part is built."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("catalogue")))
-        write_index(make_index([entry_of(build_part("washer_m36").name)], {}, Index(parts={}, left_out={})))
-        names: dict[str, list[str]] = {}
-        for recipe in families.recipes().values():
-            names.setdefault(split_of(recipe.family, recipe.name), []).append(recipe.name)
-        yield names
-
-
-@pytest.mark.parametrize(
-    ("numbers", "missing"),
-    [
-        ({"train": 1, "test": 3}, "validation"),
-        ({"test": 3}, "validation"),
-        ({"new_sizes": 1, "test": 2}, "validation"),
-        ({"validation": 1, "test": 3}, "train"),
-        ({"validation": 3}, "train"),
-        ({"train": 1, "new_sizes": 1}, "validation"),
-        ({"new_sizes": 2}, "validation"),
-    ],
-    ids=str,
-)
-def test_a_side_without_parts_takes_none_of_the_held_out_families(named, numbers, missing):
-    parts = tuple(name for side, n in numbers.items() for name in named[side][:n])
-    with pytest.raises(BadDataset, match=f"no part is left for {missing} .*--parts {missing}, too"):
-        part_sides(parts, 0.2, "catalogue")
-
-
-def test_a_side_without_parts_takes_one_that_may_be_trained_on(named):
-    held_out = {name: "test" for name in named["test"][:5]} | {named["new_sizes"][0]: "new_sizes"}
-    others = tuple(named["train"][:2])
-    sides = part_sides((*held_out, *others), 0.2, "catalogue")
-    assert held_out.items() <= sides.items()
-    assert {sides[name] for name in others} == {"train", "validation"}
 
 
 def test_the_quality_network_sees_every_second_pixel_of_the_middle_columns(dataset):
