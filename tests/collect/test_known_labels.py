@@ -60,7 +60,7 @@ def test_what_does_not_fit_labels_of_planned_grasps_is_refused(labels, tmp_path,
     assert not (tmp_path / "data").exists()
 
 
-def test_labels_of_random_and_of_planned_grasps_are_not_restored_together(collected, labels, tmp_path):
+def test_labels_of_random_and_of_planned_grasps_are_not_restored_together(collected, tmp_path):
     export_labels(collected, tmp_path / "random.labels")
     lone = tmp_path / "lone"
     shutil.copytree(collected, lone)
