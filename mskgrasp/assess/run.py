@@ -34,7 +34,7 @@ from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 10
+SCENE_VERSION = 11
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = ("parts", "out", "tolerance", "trials", "workers", "quick", "simulations", *BY_CONTENT)
 

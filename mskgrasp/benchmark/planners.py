@@ -126,7 +126,8 @@ class Planners:
                 return OtherPlanner(AntipodalPlanner(workspace), workspace, name)
             case "paper":
                 assert settings.paper_models is not None
-                return make_planner(settings.paper_models, PlannerConfig(recentre=False), self.cell)
+                as_in_paper = PlannerConfig(recentre=False, sure_quality=0.0)
+                return make_planner(settings.paper_models, as_in_paper, self.cell)
             case "ours":
                 return make_planner(settings.models, PlannerConfig(), self.cell)
             case "ours-min-quality":

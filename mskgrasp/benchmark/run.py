@@ -28,7 +28,7 @@ from mskgrasp.trials.cell_file import CellFile, read_cell
 from mskgrasp.trials.placed_scenes import placed_trials
 from mskgrasp.trials.placed_trial import PlacedTrial
 
-SCENE_VERSION = 9
+SCENE_VERSION = 10
 """Raised by every change after which a seed makes other trials."""
 _MAY_CHANGE = (
     "planners",

@@ -46,7 +46,7 @@ from mskgrasp.simulation.certify_parts import certify_missing
 from mskgrasp.trials.cell_file import check_loads
 from mskgrasp.trials.engine import connected_engine
 
-SCENE_VERSION = 8
+SCENE_VERSION = 9
 """Raised by every change after which a seed makes other placements."""
 
 

@@ -13,7 +13,7 @@ MIN_QUALITY = 0.5
 
 
 class PlannerConfig(Config):
-    """Settings of the search and the selection; the defaults are the paper's but for ``recentre``."""
+    """Settings of search and selection; as in the paper but for ``sure_quality`` and ``recentre``."""
 
     n_candidates: int = Field(default=3200, ge=1, le=1_000_000)
     top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
@@ -25,6 +25,9 @@ class PlannerConfig(Config):
     min_quality: float | None = Field(default=None, ge=0.0, le=1.0)
     """Lowest predicted quality of a selected grasp; null: none for a plan and for experiments in simulation,
     which measure what poor grasps do, as the paper did; else 0.5."""
+    sure_quality: float = Field(default=0.95, ge=0.0, le=1.0)
+    """low_variance chooses among the best grasps of at least this quality; if there are none, it takes the
+    best quality. 0: among all of the best, as in the paper."""
     check_fingers: bool = False
     """Exclude grasps whose open fingers would collide with something in the depth image."""
     recentre: bool = True

@@ -46,8 +46,6 @@ RECENTRED = 48
 
 What the search loses by both, and by smaller numbers: `tests.benchmarks.search_breadth`.
 """
-SURE = 0.95
-"""Recentred grasps need this quality, or that of the shortlist's last, if it is lower."""
 Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 """Function that predicts mean and variance (n, k) and the variance score (n,) of grasps (n, 4)."""
 
@@ -205,12 +203,12 @@ class Planner:
             Candidates, qualities, and the shortlist, best quality first, the added ones among them.
         """
         mean, variance, scores = predict(candidates[rows])
-        best = np.argsort(scores, kind="stable")[:RECENTRED]
+        best = by_score(found[rows], scores, self.config)[:RECENTRED]
         moved = self.cleared(where_held(candidates[rows[best]], mean[best]))
         if self.config.check_fingers:
             moved = moved[hand_room(scene, moved)[0]]
         quality = qualities(self.models, scene, moved, self.config.chunk_size)
-        good = quality >= min(SURE, float(found[rows].min()))
+        good = quality >= min(self.config.sure_quality, float(found[rows].min()))
         more = Shortlist(len(candidates) + np.arange(int(good.sum())), *predict(moved[good]))
         candidates = np.append(candidates, moved[good], axis=0)
         found = np.append(found, quality[good])
@@ -235,7 +233,8 @@ class Planner:
             if len(good) > PROMISING and self.config.policy != "quality":
                 if scores is None:
                     *_, scores = self._predicted(scene, candidates[rows], all_views=False)
-                rows = rows[np.sort(good[np.argsort(scores[good], kind="stable")[:PROMISING]])]
+                first = by_score(found[rows[good]], scores[good], self.config)[:PROMISING]
+                rows = rows[np.sort(good[first])]
             rows = rows[:PROMISING]
         return Shortlist(rows, *self._predicted(scene, candidates[rows], all_views=True))
 
@@ -334,7 +333,21 @@ def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, v
     return of_centre[..., :3].sum(axis=-1) + view.gyration_radius**2 * turned
 
 
+def by_score(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> np.ndarray:
+    """Order grasps (n,) by variance score, those of ``sure_quality`` first; without any, the best quality is.
+
+    Args:
+        qualities: (n,) predicted probabilities of success.
+        scores: (n,) of `variance_score`.
+        config: Gives ``sure_quality``.
+    """
+    unsure = qualities < min(config.sure_quality, float(qualities.max(initial=0.0)))
+    return np.lexsort((scores, unsure))
+
+
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:
     """Select one of the shortlisted grasps, best quality first, of those with at least ``least_quality``."""
     good = np.flatnonzero(qualities >= config.least_quality)
-    return int(good[0] if config.policy == "quality" else good[np.argmin(scores[good])])
+    if config.policy == "quality":
+        return int(good[0])
+    return int(good[by_score(qualities[good], scores[good], config)[0]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -97,8 +98,8 @@ class Chooser:
     Attributes:
         candidates: Source of candidates and qualities.
         predictor: Predicts displacements, and the variances of the policy ``low_variance``.
-        policy: As in `mskgrasp.planning.config.PlannerConfig`; ``recentred`` is ``low_variance`` among the
-            same grasps and those recentred (`Planner.recentred`).
+        policy: ``quality``; ``low_variance``, as in the paper: among all of the best, whatever their quality;
+            ``recentred``, the planner's own ``low_variance``: with recentred grasps and ``sure_quality``.
         part: Name of the part on the table.
         tracker: Source of its pose for a predictor that needs it; None: no pose.
     """
@@ -117,8 +118,10 @@ class Chooser:
             GraspRefused: No candidate has the required quality.
         """
         planner = self.candidates.planner
-        policy = "low_variance" if self.policy == "recentred" else self.policy
-        config = planner.config.model_copy(update={"policy": policy})
+        changes: dict[str, Any] = {"policy": "low_variance" if self.policy == "recentred" else self.policy}
+        if self.policy == "low_variance":
+            changes["sure_quality"] = 0.0
+        config = planner.config.model_copy(update=changes)
         scored_grasps = self.candidates.of(frame, rng)
         view, found, scoring_s = scored_grasps.view, scored_grasps.qualities, scored_grasps.seconds
         scored = time.perf_counter()

@@ -34,7 +34,7 @@ from mskgrasp.trials.predictors import (
 from mskgrasp.trials.trial import Policy, Trial, trial_key
 from mskgrasp.trials.trial_files import trial_file, write_trial
 
-SCENE_VERSION = 6
+SCENE_VERSION = 7
 """Raised by every change after which `TrialRunner` draws other scenes from a seed."""
 
 

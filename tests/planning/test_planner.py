@@ -15,7 +15,15 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.perception.part_detection import view_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.grasp_plan import GraspPlan
-from mskgrasp.planning.planner import PROMISING, RECENTRED, SURE, Planner, select, shortlist, variance_score
+from mskgrasp.planning.planner import (
+    PROMISING,
+    RECENTRED,
+    Planner,
+    by_score,
+    select,
+    shortlist,
+    variance_score,
+)
 from mskgrasp.planning.refine import hand_room
 from mskgrasp.planning.scoring import Scene, displacements
 from tests import synthetic
@@ -25,7 +33,7 @@ from tests.synthetic import REGION, Box
 
 
 def test_the_planned_grasp_is_the_least_uncertain_of_the_best():
-    config = PlannerConfig(n_candidates=600, top_fraction=0.05, recentre=False)
+    config = PlannerConfig(n_candidates=600, top_fraction=0.05, sure_quality=0.0, recentre=False)
     plan = planner(config).plan(FRAME, np.random.default_rng(0))
     centre = plan.candidates.T_base_grasp.inverse().apply(plan.view.centre_base)
     best = np.argsort(np.abs(centre[:, 0]))[:30]  # quality falls with |centre x|
@@ -98,7 +106,7 @@ def test_one_view_of_the_best_qualities_says_which_are_seen_in_all():
         )
         for all_views in (False, True)
     )
-    promising = np.sort(np.argsort(one)[:PROMISING])
+    promising = np.sort(by_score(first.qualities[best], one, PlannerConfig())[:PROMISING])
     assert first.shortlist.tolist() == best[promising].tolist()
     assert np.allclose(first.shortlist_scores, every[promising], rtol=1e-4)
     assert first.score == first.shortlist_scores.min()
@@ -122,7 +130,7 @@ def test_the_best_are_tried_where_the_part_would_come_to_lie_and_move_less_there
     assert np.array_equal(recentred.candidates[:800].as_vector(), first.candidates.as_vector())
     more = recentred.candidates[800:].as_vector()
     assert 0 < len(more) <= RECENTRED and recentred.score < first.score
-    least = min(SURE, float(first.qualities[shortlist(first.qualities, 0.03)].min()))
+    least = min(PlannerConfig().sure_quality, float(first.qualities[shortlist(first.qualities, 0.03)].min()))
     assert (recentred.qualities[800:] >= least).all() and recentred.quality >= least
     scene = Scene.of(FRAME, first.view, 0.0, torch.device("cpu"))
     shown = first.candidates[first.shortlist].as_vector()
@@ -149,9 +157,18 @@ def test_the_shortlist_is_the_best_share_and_never_empty():
 
 def test_selection_minimises_the_score_among_those_good_enough():
     qualities, scores = np.array([0.9, 0.8, 0.7]), np.array([3.0, 2.0, 1.0])
-    assert select(qualities, scores, PlannerConfig()) == 2
-    assert select(qualities, scores, PlannerConfig(min_quality=0.75)) == 1
+    assert select(qualities, scores, PlannerConfig(sure_quality=0.0)) == 2
+    assert select(qualities, scores, PlannerConfig(sure_quality=0.0, min_quality=0.75)) == 1
     assert select(qualities, scores, PlannerConfig(policy="quality")) == 0
+
+
+def test_grasps_of_sure_quality_come_first_and_without_any_the_best_quality():
+    qualities, scores = np.array([0.99, 0.96, 0.94, 0.9]), np.array([4.0, 3.0, 2.0, 1.0])
+    assert by_score(qualities, scores, PlannerConfig()).tolist() == [1, 0, 3, 2]
+    assert select(qualities, scores, PlannerConfig()) == 1
+    assert by_score(qualities[2:], scores[2:], PlannerConfig()).tolist() == [0, 1]
+    assert select(qualities[2:], scores[2:], PlannerConfig()) == 0
+    assert len(by_score(np.zeros(0), np.zeros(0), PlannerConfig())) == 0
 
 
 def test_the_score_is_the_mean_squared_error_of_the_parts_points():

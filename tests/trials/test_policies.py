@@ -69,9 +69,12 @@ def test_the_policy_of_the_best_quality_takes_it_whatever_the_variances():
 
 @pytest.mark.parametrize("policy", ["quality", "low_variance", "recentred"])
 def test_with_the_planners_own_model_the_plan_is_the_planners(policy: str):
-    recentre = policy == "recentred"
-    settings = dict(policy="low_variance" if recentre else policy, recentre=recentre)
-    own: Planner = planner(CONFIG.model_copy(update=settings))
+    settings = {
+        "quality": dict(policy="quality"),
+        "low_variance": dict(policy="low_variance", recentre=False, sure_quality=0.0),  # as in the paper
+        "recentred": dict(policy="low_variance"),
+    }
+    own: Planner = planner(CONFIG.model_copy(update=settings[policy]))
     network = NetworkPredictor(own.models, CONFIG.chunk_size)
     chosen = Chooser(Candidates(own), network, policy, "nut", None).plan(FRAME, rng())
     expected = own.plan(FRAME, rng())
