@@ -334,15 +334,15 @@ def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, v
 
 
 def by_score(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> np.ndarray:
-    """Order grasps (n,) by variance score, those of ``sure_quality`` first; without any, the best quality is.
+    """Order grasps (n,) as they would be chosen: of ``sure_quality`` by score, then the others by quality.
 
     Args:
         qualities: (n,) predicted probabilities of success.
         scores: (n,) of `variance_score`.
         config: Gives ``sure_quality``.
     """
-    unsure = qualities < min(config.sure_quality, float(qualities.max(initial=0.0)))
-    return np.lexsort((scores, unsure))
+    unsure = qualities < config.sure_quality
+    return np.lexsort((np.where(unsure, -qualities, scores), unsure))
 
 
 def select(qualities: np.ndarray, scores: np.ndarray, config: PlannerConfig) -> int:

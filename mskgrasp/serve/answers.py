@@ -16,7 +16,7 @@ from mskgrasp.core.errors import MskgraspError, NoGraspFound, NoPartFound, Table
 from mskgrasp.core.grasp import PartView, centre_in_grasp_frame, to_object_displacement
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import place_pose
-from mskgrasp.planning.planner import Planner, variance_score
+from mskgrasp.planning.planner import Planner, by_score, variance_score
 from mskgrasp.planning.scoring import Scene, displacements, qualities
 from mskgrasp.serve.rejection import Rejected, error_body
 from mskgrasp.serve.requests import PlaceRequest, PlanRequest, ScoreRequest, parse_frame
@@ -77,7 +77,7 @@ def _next_best(planner: Planner, plan: GraspPlan, n: int) -> np.ndarray:
         (found >= planner.config.least_quality) & (grasps != plan.grasp.as_vector()).any(axis=-1)
     )
     if planner.config.policy == "low_variance":
-        good = good[np.argsort(plan.shortlist_scores[good], kind="stable")]
+        good = good[by_score(found[good], plan.shortlist_scores[good], planner.config)]
     return grasps[good[:n]]
 
 

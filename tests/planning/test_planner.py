@@ -162,11 +162,11 @@ def test_selection_minimises_the_score_among_those_good_enough():
     assert select(qualities, scores, PlannerConfig(policy="quality")) == 0
 
 
-def test_grasps_of_sure_quality_come_first_and_without_any_the_best_quality():
+def test_grasps_of_sure_quality_come_first_by_score_and_then_the_others_by_quality():
     qualities, scores = np.array([0.99, 0.96, 0.94, 0.9]), np.array([4.0, 3.0, 2.0, 1.0])
-    assert by_score(qualities, scores, PlannerConfig()).tolist() == [1, 0, 3, 2]
+    assert by_score(qualities, scores, PlannerConfig()).tolist() == [1, 0, 2, 3]
+    assert by_score(qualities, scores, PlannerConfig(sure_quality=0.0)).tolist() == [3, 2, 1, 0]
     assert select(qualities, scores, PlannerConfig()) == 1
-    assert by_score(qualities[2:], scores[2:], PlannerConfig()).tolist() == [0, 1]
     assert select(qualities[2:], scores[2:], PlannerConfig()) == 0
     assert len(by_score(np.zeros(0), np.zeros(0), PlannerConfig())) == 0
 

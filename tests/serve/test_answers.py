@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 
 import numpy as np
@@ -30,6 +31,17 @@ def test_a_plan_is_that_of_the_planner_with_alternatives_in_its_order(planner: P
     scores = [one["score"] for one in found["alternatives"]]
     assert len(scores) == 4 and scores == sorted(scores) and scores[0] >= found["score"]
     assert all(one["quality"] >= 0.5 and one["grasp"] != found["grasp"] for one in found["alternatives"])
+
+
+def test_alternatives_below_the_sure_quality_come_last_by_quality(planner: Planner):
+    bound = float(np.sort(planner.plan(FRAME, np.random.default_rng(0)).qualities)[-4])
+    half_sure = copy.copy(planner)
+    half_sure.config = planner.config.model_copy(update={"sure_quality": bound})
+    _, found = answer(half_sure, "plan", npz(alternatives=MAX_ALTERNATIVES))
+    pairs = [(one["quality"], one["score"]) for one in found["alternatives"]]
+    sure = [one for one in pairs if one[0] >= bound]
+    assert 0 < len(sure) < len(pairs)
+    assert pairs == [*sorted(sure, key=lambda one: one[1]), *sorted(pairs[len(sure) :], reverse=True)]
 
 
 def test_no_more_alternatives_are_listed_than_the_last_selection_has_and_the_schema_says_so(planner: Planner):
