@@ -208,7 +208,8 @@ class Planner:
         if self.config.check_fingers:
             moved = moved[hand_room(scene, moved)[0]]
         quality = qualities(self.models, scene, moved, self.config.chunk_size)
-        good = quality >= min(self.config.sure_quality, float(found[rows].min()))
+        # As good as the shortlist, or sure; 0 calls none sure.
+        good = quality >= min(self.config.sure_quality or 1.0, float(found[rows].min()))
         more = Shortlist(len(candidates) + np.arange(int(good.sum())), *predict(moved[good]))
         candidates = np.append(candidates, moved[good], axis=0)
         found = np.append(found, quality[good])

@@ -130,8 +130,11 @@ def test_the_best_are_tried_where_the_part_would_come_to_lie_and_move_less_there
     assert np.array_equal(recentred.candidates[:800].as_vector(), first.candidates.as_vector())
     more = recentred.candidates[800:].as_vector()
     assert 0 < len(more) <= RECENTRED and recentred.score < first.score
-    least = min(PlannerConfig().sure_quality, float(first.qualities[shortlist(first.qualities, 0.03)].min()))
+    shortlisted = float(first.qualities[shortlist(first.qualities, 0.03)].min())
+    least = min(PlannerConfig().sure_quality, shortlisted)
     assert (recentred.qualities[800:] >= least).all() and recentred.quality >= least
+    none_sure = plan(sure_quality=0.0).qualities[800:]
+    assert 0 < len(none_sure) < RECENTRED and (none_sure >= shortlisted).all()
     scene = Scene.of(FRAME, first.view, 0.0, torch.device("cpu"))
     shown = first.candidates[first.shortlist].as_vector()
     moves = [
