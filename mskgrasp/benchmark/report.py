@@ -177,7 +177,7 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
             Table(
                 header=("planner", "lifted", *(NAMES[one] for one in COLUMNS), "not placed", "wrong pose"),
                 rows=table,
-                caption="Shares of all attempts; 95 % intervals, Wilson's by parts. Wrong pose: attempts at "
+                caption="Shares of all attempts; 95 % intervals over parts. Wrong pose: attempts at "
                 "a part taken to lie in another resting pose, which do not count as placed",
             )
         ],

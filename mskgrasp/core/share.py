@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mskgrasp.core.metrics import clustered_wilson_interval
+from mskgrasp.core.metrics import share_interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +19,7 @@ class Share:
         n: Number that count.
         of: Number of trials.
         value: The share; 0 of no trial.
-        interval: 95 %, Wilson's by parts, since trials of one part are alike (`clustered_wilson_interval`).
+        interval: 95 %, over parts, since trials of one part are alike (`share_interval`).
     """
 
     n: int
@@ -32,7 +32,7 @@ class Share:
         """Share of trials (n,) that count, with the part of each."""
         n, of = int(np.sum(hits)), len(parts)
         _, which = np.unique(np.asarray(parts, dtype=str), return_inverse=True)
-        interval = clustered_wilson_interval(np.bincount(which, weights=hits), np.bincount(which))
+        interval = share_interval(np.bincount(which, weights=hits), np.bincount(which))
         return cls(n=n, of=of, value=n / of if of else 0.0, interval=interval)
 
     def to_json(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.grasp import FAILURES
-from mskgrasp.core.metrics import clustered_wilson_interval
+from mskgrasp.core.metrics import share_interval
 from mskgrasp.dataset.label_error import read_label_error
 from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
 
@@ -227,7 +227,7 @@ def markdown(card: Card) -> str:
 
 def _share(won: Sequence[int], tried: Sequence[int]) -> str:
     """Share of successes by their numbers at each part, at which attempts are alike."""
-    low, high = clustered_wilson_interval(np.array(won), np.array(tried))
+    low, high = share_interval(np.array(won), np.array(tried))
     return f"{sum(won) / max(sum(tried), 1):.1%} ({low:.1%} - {high:.1%})"
 
 

@@ -66,7 +66,7 @@ def draw_success(summary: SuccessSummary, path: Path) -> None:
             left.axvline(paper, color=INK, lw=1, ls="--", label=f"paper, simulated: {paper:.1%}")
         rest = f", the worst {len(shown)} of {len(rows)}" if len(rows) > len(shown) else ""
         left.set_title(f"Lifted, by {'family' if by_family else 'part'}{rest}")
-        left.set(xlim=(-0.02, 1.02), xlabel="share of grasps, 95 % Wilson intervals")
+        left.set(xlim=(-0.02, 1.02), xlabel="share of grasps, 95 % intervals")
         left.set_ylim(-0.7, len(shown) - 0.3)
         left.legend(fontsize=8, loc="upper left")
         reasons = overall.reasons

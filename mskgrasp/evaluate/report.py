@@ -152,7 +152,7 @@ def _success(summary: SuccessSummary, folder: Path) -> list[Section]:
             figures=[
                 Figure(
                     path=folder / "success.png",
-                    caption="Share of grasps that lifted the part, with 95 % Wilson intervals",
+                    caption="Share of grasps that lifted the part, with 95 % intervals",
                 ),
                 Figure(
                     path=folder / "errors.png",

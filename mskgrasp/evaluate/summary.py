@@ -42,7 +42,7 @@ class TrialStatistics:
     A quantity that no trial measured is None, not zero.
 
     Attributes:
-        success_interval: Wilson interval of the success rate, by parts, since trials of one part are alike.
+        success_interval: Interval of the success rate over parts, whose trials are alike (`share_interval`).
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.

@@ -21,7 +21,7 @@ from mskgrasp.assess.summary import DISTANCES, Row, summarise
 from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, trial_bench, write_cells
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
-from mskgrasp.core.metrics import clustered_wilson_interval, rms_interval
+from mskgrasp.core.metrics import rms_interval, share_interval
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.evaluate.summary import displacement_errors
 from mskgrasp.learning.grasp_models import load_models
@@ -177,7 +177,7 @@ def _figures(trials: Trials) -> tuple[str, ...]:
 
     def share(hits: Sequence[Sequence[bool]]) -> str:
         n, of = np.array([sum(one) for one in hits]), np.array([len(one) for one in hits])
-        low, high = clustered_wilson_interval(n[of > 0], of[of > 0])
+        low, high = share_interval(n[of > 0], of[of > 0])
         return f"{n.sum() / max(1, of.sum()):.1%} [{low:.1%}, {high:.1%}]"
 
     errors = [_errors(one) for one in groups]

@@ -19,7 +19,7 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.geometry import wrap_angle
-from mskgrasp.core.metrics import bootstrap_interval, clustered_wilson_interval
+from mskgrasp.core.metrics import bootstrap_interval, share_interval
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.grasp_models import WEIGHTS
 from mskgrasp.palletize.config import PalletizeConfig
@@ -280,7 +280,7 @@ class StoredFigure:
         unit: Of the value.
         n: Trials that have it.
         value: In the unit.
-        interval: Wilson's by parts for a share of trials, bootstrapped over parts for the others.
+        interval: Over parts: `share_interval` of a share of trials, the bootstrap's of the others.
     """
 
     title: str
@@ -294,9 +294,7 @@ def figures_of(rows: Sequence[Row]) -> list[StoredFigure]:
     """The figures of a run; those that no trial has are left out."""
     held = sum(row.held for row in rows)
     _, which = np.unique([row.part for row in rows], return_inverse=True)
-    low, high = clustered_wilson_interval(
-        np.bincount(which, weights=[row.held for row in rows]), np.bincount(which)
-    )
+    low, high = share_interval(np.bincount(which, weights=[row.held for row in rows]), np.bincount(which))
     found = [
         StoredFigure(
             title="lifted",

@@ -86,8 +86,8 @@ def test_a_figure_has_the_interval_over_parts_and_a_lost_trial_has_no_error():
     figures = {one.title: one for one in figures_of(rows)}
     assert "the same without correction" not in figures
     held = figures["lifted"]
-    # Three parts tell less than four trials, of which Wilson's interval is 30.1 to 95.4: worked out by hand.
-    assert (held.n, held.value) == (4, 75) and held.interval == pytest.approx((6.2, 99.3), abs=0.1)
+    # Jeffreys's interval of four trials is 28 to 97, of three 23 to 98.
+    assert (held.n, held.value) == (4, 75) and held.interval == pytest.approx((24, 98), abs=1)
     rmse = figures["RMSE of the displacement"]
     assert rmse.n == 3 and rmse.value == pytest.approx(np.sqrt((9 + 9 + 16) / 3))
     assert rmse.interval == pytest.approx((3, 4))  # parts are drawn whole: both draws may be a, or b

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.metrics import clustered_wilson_interval
+from mskgrasp.core.metrics import share_interval
 from mskgrasp.parts.catalogue import Entry, Index, read_index, with_ratings, write_index
 from mskgrasp.runtime.console_table import Table, print_table
 
@@ -76,7 +76,7 @@ def _report(index: Index, low: float, high: float) -> None:
         n, won = sum(r.attempts for r in rated), sum(r.successes for r in rated)
         tried = [r for r in rated if r.attempts]
         # By parts: grasps of one part are alike.
-        interval = clustered_wilson_interval(
+        interval = share_interval(
             np.array([r.successes for r in tried]), np.array([r.attempts for r in tried])
         )
         rows.append((
