@@ -1,4 +1,4 @@
-"""Metrics of predictions, calibration and uncertainty, and confidence intervals, on numpy arrays."""
+"""Metrics of predictions and their uncertainty, and confidence intervals, on numpy arrays."""
 
 from __future__ import annotations
 
@@ -58,56 +58,6 @@ def gaussian_nll(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> fl
     return float(terms.sum(axis=1).mean() / 2) if len(terms) else float("nan")
 
 
-INTERVAL_LEVELS = (*np.round(np.arange(0.05, 0.951, 0.05), 2).tolist(), 0.99)
-"""Probabilities of the central intervals that a table of half widths lists."""
-
-
-def normal_half_width(level: float) -> float:
-    """Half width of the central interval of probability ``level``, in standard deviations of a normal."""
-    return float(ndtri((1 + level) / 2))
-
-
-def measured_half_widths(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Half widths (`INTERVAL_LEVELS`, k), in predicted deviations, of intervals that hold these true (n, k).
-
-    The quantiles of |error| / deviation: normalised conformal prediction (Papadopoulos et al. 2008).
-    """
-    error = np.abs(standardised_error(mean, variance, true))
-    return np.quantile(error, INTERVAL_LEVELS, axis=0)
-
-
-def half_width_of(table: np.ndarray, level: float) -> np.ndarray:
-    """Half widths (k,) of the central interval of probability ``level``, from a table of them.
-
-    Between the levels of the table the ratio to a normal's half width is interpolated; beyond, it is kept.
-
-    Args:
-        table: (`INTERVAL_LEVELS`, k) in standard deviations.
-        level: Probability.
-    """
-    normal = np.array([normal_half_width(each) for each in INTERVAL_LEVELS])
-    ratio = np.asarray(table, dtype=np.float64) / normal[:, None]
-    width = normal_half_width(level)
-    return width * np.array([np.interp(width, normal, column) for column in ratio.T])
-
-
-HalfWidth = Callable[[float], float | np.ndarray]
-"""Half width, or one a component (k,), of the central interval of a probability, in standard deviations."""
-
-
-def coverage(
-    mean: np.ndarray,
-    variance: np.ndarray,
-    true: np.ndarray,
-    level: float = 0.9,
-    half_width: HalfWidth = normal_half_width,
-) -> np.ndarray:
-    """Share of true values inside the central interval of probability ``level``, per axis (k,)."""
-    if not len(true):
-        return np.full(np.shape(true)[1], np.nan)
-    return (np.abs(standardised_error(mean, variance, true)) <= half_width(level)).mean(axis=0)
-
-
 def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Continuous ranked probability score of Gaussians, per axis (k,), in the axes' units; 0 is perfect.
 
@@ -116,15 +66,6 @@ def crps(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray
     z = standardised_error(mean, variance, true)
     score = z * (2 * ndtr(z) - 1) + 2 * np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi) - 1 / np.sqrt(np.pi)
     return (np.sqrt(variance) * score).mean(axis=0) if len(z) else np.full(np.shape(true)[1], np.nan)
-
-
-def calibration_error(
-    mean: np.ndarray, variance: np.ndarray, true: np.ndarray, half_width: HalfWidth = normal_half_width
-) -> np.ndarray:
-    """Mean difference of level and coverage of the central intervals of 5, 10, ... 95 %, per axis (k,)."""
-    levels = np.linspace(0.05, 0.95, 19)
-    covered = np.stack([coverage(mean, variance, true, level, half_width) for level in levels])
-    return np.abs(covered - levels[:, None]).mean(axis=0)
 
 
 def sparsification(error: np.ndarray, uncertainty: np.ndarray, steps: int = 50) -> tuple[np.ndarray, ...]:

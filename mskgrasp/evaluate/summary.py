@@ -11,7 +11,8 @@ import numpy as np
 
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import TILT_LIMIT
-from mskgrasp.core.metrics import coverage, rms_interval
+from mskgrasp.core.metrics import rms_interval
+from mskgrasp.core.predicted_intervals import coverage
 from mskgrasp.core.share import Share
 from mskgrasp.trials.lowess import TURN_LENGTH
 from mskgrasp.trials.trial import Prediction, Trial

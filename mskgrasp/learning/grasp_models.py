@@ -21,7 +21,7 @@ from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.core.files import read_bounded, write_whole
 from mskgrasp.core.grasp import HAND_GEOMETRY, SAME_HAND
 from mskgrasp.core.json_text import parse_json
-from mskgrasp.core.metrics import INTERVAL_LEVELS, half_width_of, normal_half_width
+from mskgrasp.core.predicted_intervals import LEVELS, half_width_of, normal_half_width
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.hand_features import HandFeatures
 from mskgrasp.learning.label_source import LabelSource
@@ -45,7 +45,7 @@ class ModelCalibration(Config):
     variance_scale: tuple[Annotated[float, Field(gt=0.0)], ...] = ()
     """Factor of each variance, so that the central 90 % interval holds 90 %; empty: 1."""
     half_widths: tuple[tuple[Annotated[float, Field(gt=0.0)], ...], ...] = ()
-    """Half widths of the central intervals of `mskgrasp.core.metrics.INTERVAL_LEVELS`, in standard deviations
+    """Half widths of the central intervals of `LEVELS`, in standard deviations
     of each component; empty: a normal distribution's.
 
     Most parts do not rise in the hand, some do by 10 mm: no normal distribution has such tails.
@@ -54,8 +54,8 @@ class ModelCalibration(Config):
     @model_validator(mode="after")
     def _wider_intervals_hold_more(self) -> Self:
         table = self.half_widths
-        if table and len(table) != len(INTERVAL_LEVELS):
-            raise ValueError(f"half_widths has {len(table)} rows, {len(INTERVAL_LEVELS)} are needed")
+        if table and len(table) != len(LEVELS):
+            raise ValueError(f"half_widths has {len(table)} rows, {len(LEVELS)} are needed")
         if len({len(row) for row in table}) > 1 or any(
             wide < narrow for one, next_ in pairwise(table) for narrow, wide in zip(one, next_, strict=False)
         ):

@@ -11,6 +11,14 @@ from mskgrasp.core import metrics
 from mskgrasp.core.displacement_covariance import object_displacement_covariance, swing_squared
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.grasp import TILT_LIMIT, to_object_displacement
+from mskgrasp.core.predicted_intervals import (
+    HalfWidth,
+    calibration_error,
+    coverage,
+    half_width_of,
+    measured_half_widths,
+    normal_half_width,
+)
 from mskgrasp.learning.grasp_models import ModelCalibration, Models
 from mskgrasp.learning.model_metrics import (
     DisplacementMetrics,
@@ -103,8 +111,8 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
     mean, variance = predict_grasp_displacement(models, samples, held)
     if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
         target = samples.targets(held, models.meta.network).double().numpy()
-        widths = metrics.measured_half_widths(mean, variance, target)
-        deviation = metrics.half_width_of(widths, 0.9) / metrics.normal_half_width(0.9)
+        widths = measured_half_widths(mean, variance, target)
+        deviation = half_width_of(widths, 0.9) / normal_half_width(0.9)
         scale = tuple(np.maximum(deviation**2, 1e-6))
         half_widths = tuple(map(tuple, np.maximum(widths / np.sqrt(scale), 1e-6).tolist()))
     return ModelCalibration(
@@ -247,7 +255,7 @@ def _uncertainty_metrics(
     rows: torch.Tensor,
     mean: np.ndarray,
     variance: np.ndarray,
-    half_width: metrics.HalfWidth,
+    half_width: HalfWidth,
 ) -> UncertaintyMetrics | None:
     """Compute metrics of the predicted variances; None without variances or rows."""
     if not np.isfinite(variance).all() or not len(rows):
@@ -258,11 +266,11 @@ def _uncertainty_metrics(
     tilted = samples.swing[rows].norm(dim=1).numpy() > TILT_LIMIT
     axes = {
         "crps": metrics.crps(mean, variance, target),
-        "calibration_error": metrics.calibration_error(mean, variance, target, half_width),
+        "calibration_error": calibration_error(mean, variance, target, half_width),
         "sharpness": np.sqrt(variance).mean(axis=0),
         "rmse": np.sqrt((metrics.standardised_error(mean, variance, target) ** 2 * variance).mean(axis=0)),
     } | {
-        f"coverage_{level}": metrics.coverage(mean, variance, target, level / 100, half_width)
+        f"coverage_{level}": coverage(mean, variance, target, level / 100, half_width)
         for level in (50, 80, 90, 95)
     }
     return UncertaintyMetrics(
@@ -312,7 +320,7 @@ def prediction_errors(
     predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
     target = true_outcomes(samples, rows, mean)
-    covered = metrics.coverage(mean, variance, target)
+    covered = coverage(mean, variance, target)
     known = bool(np.isfinite(variance).all())
     return PredictionErrors(
         translation_rmse=metrics.translation_rmse(predicted, displacement),

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from mskgrasp.core import metrics
 from mskgrasp.core.geometry import wrap_angle
 from mskgrasp.core.palette import BLUE, FAINT, GREEN, ORANGE
+from mskgrasp.core.predicted_intervals import HalfWidth, coverage
 from mskgrasp.learning.grasp_models import Models
 from mskgrasp.learning.held_out import (
     AXES,
@@ -64,10 +65,14 @@ def _reliability(axes: Axes, probability: np.ndarray, success: np.ndarray) -> No
 
 
 def _coverage(
-    axes: Axes, mean: np.ndarray, variance: np.ndarray, target: np.ndarray, half_width: metrics.HalfWidth
+    axes: Axes,
+    mean: np.ndarray,
+    variance: np.ndarray,
+    target: np.ndarray,
+    half_width: HalfWidth,
 ) -> None:
     levels = np.linspace(0.05, 0.95, 19)
-    covered = np.stack([metrics.coverage(mean, variance, target, level, half_width) for level in levels])
+    covered = np.stack([coverage(mean, variance, target, level, half_width) for level in levels])
     axes.plot([0, 1], [0, 1], color=FAINT, lw=1, ls="--")
     for k, name in enumerate(AXES[: covered.shape[1]]):
         axes.plot(levels, covered[:, k], color=_COLOURS[k % 4], lw=1.5, ls="-" if k < 4 else ":", label=name)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mskgrasp.core import metrics
 from mskgrasp.core.files import write_whole
+from mskgrasp.core.predicted_intervals import half_width_of, normal_half_width
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models
 from mskgrasp.learning.network_config import NetworkConfig
@@ -82,8 +82,8 @@ class Predictions:
     def half_width(self, level: float) -> float | np.ndarray:
         """Half widths (4,) of the central interval of a probability, in predicted standard deviations."""
         if not self.half_widths.size:
-            return metrics.normal_half_width(level)
-        return metrics.half_width_of(self.half_widths[:, :4], level)
+            return normal_half_width(level)
+        return half_width_of(self.half_widths[:, :4], level)
 
     def write(self, path: Path) -> None:
         """Store them atomically."""

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from mskgrasp.core import metrics
+from mskgrasp.core.predicted_intervals import coverage
 from mskgrasp.learning.held_out import AXES, centroid_errors, variance_score
 from mskgrasp.learning.samples import Samples
 from mskgrasp.runtime.console_table import Table
@@ -187,7 +188,7 @@ def _coverage(samples: Samples, rows: torch.Tensor, seeds: Sequence[Predictions]
     covered = np.mean(
         [
             [
-                metrics.coverage(one.mean[:, :4], one.variance[:, :4], target, level / 100, one.half_width)
+                coverage(one.mean[:, :4], one.variance[:, :4], target, level / 100, one.half_width)
                 for level in LEVELS
             ]
             for one in seeds

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from mskgrasp.core import metrics
+from mskgrasp.core import predicted_intervals
 from mskgrasp.learning import held_out
 from mskgrasp.learning.grasp_models import ModelCalibration, Models, build_models
 from mskgrasp.learning.sides import split
@@ -82,7 +82,7 @@ def test_calibrated_intervals_of_every_probability_hold_that_share_of_other_rows
     target = samples.targets(held, calibrated.meta.network).double().numpy()
     half_width = calibrated.meta.calibration.half_width
     for level in (0.5, 0.8, 0.9, 0.95):
-        covered = metrics.coverage(mean, variance, target, level, half_width)
+        covered = predicted_intervals.coverage(mean, variance, target, level, half_width)
         # Some 100 rows on either side; z does not vary at all.
         assert np.allclose(covered[[0, 1, 3]], level, atol=3.5 * np.sqrt(2 * level * (1 - level) / 100))
         reported = held_out.displacement_metrics(calibrated, samples, scaled, others).uncertainty
