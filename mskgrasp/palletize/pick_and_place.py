@@ -10,7 +10,7 @@ import numpy as np
 
 from hal import RgbdFrame, capture_at_home
 from hal.errors import MotionAborted, OutOfWorkspace
-from mskgrasp.core.errors import MarkersNotFound
+from mskgrasp.core.errors import MarkersNotFound, NoPartFound
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import Grasp
 from mskgrasp.core.settings import Region
@@ -119,9 +119,13 @@ class PickAndPlace:
             return replace(failed, reason=planned.reason, refusal=planned.refusal)
         known = replace(failed, grasp=plan.grasp.as_vector().tolist(), predicted=plan.displacement.tolist())
         workspace = self._cell.workspace
-        footprint = seen_footprint(
-            frame, table_z=workspace.table_z, region=workspace.region, min_height=workspace.min_height
-        )
+        try:
+            footprint = seen_footprint(
+                frame, table_z=workspace.table_z, region=workspace.region, min_height=workspace.min_height,
+                part_height=float(plan.view.size[2]),  # a known part may have been found by it
+            )  # fmt: skip
+        except NoPartFound:
+            return replace(known, reason=reason_of(NoPartFound))
         if not slot.fits(footprint, SEEN_TOLERANCE):
             return replace(known, reason="slot too small")
         done, target, after = self._carry(frame, plan, planned.part, slot.targets(footprint), known)
@@ -196,13 +200,17 @@ class PickAndPlace:
         drop = 0.0 if swing is None else drop_of(plan.grasp, plan.view, by[3], swing)
         assert grasped.result is not None  # it succeeded
         opening = release_opening(frame, plan, grasped.result.width)
+        released: list[bool] = []
         for target in targets:
             try:
                 place(
                     self._cell, self._pose(plan, by, target, drop), engine.recover,
                     drop=drop, opening=opening, tallest=tallest, part_height=float(plan.view.size[2]),
+                    arrived=lambda: released.append(True),
                 )  # fmt: skip
             except OutOfWorkspace:
+                if released:  # the hand could not rise: nothing is held any more
+                    raise
                 continue  # the other target may be reached
             except MotionAborted as error:
                 engine.recover(error)

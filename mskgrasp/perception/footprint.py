@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -66,7 +67,12 @@ def pixel_pitch(frame: RgbdFrame) -> float:
 
 
 def seen_footprint(
-    frame: RgbdFrame, *, table_z: float, region: tuple[float, float, float, float], min_height: float
+    frame: RgbdFrame,
+    *,
+    table_z: float,
+    region: tuple[float, float, float, float],
+    min_height: float,
+    part_height: float = math.inf,
 ) -> Footprint:
     """Detect the footprint of the part in a frame.
 
@@ -75,6 +81,7 @@ def seen_footprint(
         table_z: Height of the table, base frame, metres.
         region: x_min, x_max, y_min, y_max in which the part's centre lies, base frame, metres.
         min_height: Least height of a part above the table, metres.
+        part_height: As of `find_part_pixels`.
 
     Raises:
         NoPartFound: No part is detected.
@@ -86,6 +93,7 @@ def seen_footprint(
         table_z=table_z,
         region=region,
         min_height=min_height,
+        part_height=part_height,
     )
     inner = footprint_of(found.points_base[:2, found.mask].T)
     # An edge is, on average, half a pixel further out than the last pixel on it.

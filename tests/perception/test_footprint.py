@@ -68,3 +68,11 @@ def test_the_narrowest_width_of_a_shape_does_not_depend_on_its_turn(turn: float)
     assert width(circle) == pytest.approx(0.08, abs=1e-4)
     assert width([(0, 0), (0.1, 0.0)]) == pytest.approx(0.0, abs=1e-6)
     assert width([(0, 0)]) == 0.0
+
+
+def test_a_part_that_is_known_to_be_flat_has_a_footprint():
+    frame = synthetic.frame([Box(x=0.45, y=0.02, yaw=0.3, size=(0.06, 0.03, 0.0016))])
+    with pytest.raises(NoPartFound, match="nothing rises"):
+        seen_footprint(frame, table_z=TABLE_Z, region=REGION, min_height=0.002)
+    found = seen_footprint(frame, table_z=TABLE_Z, region=REGION, min_height=0.002, part_height=0.0016)
+    assert np.abs(found.sides - [0.06, 0.03]).max() < 1.5 * pixel_pitch(frame)
