@@ -47,12 +47,18 @@ class Workspace:
         x_min, x_max, y_min, y_max = self.region
         return np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
 
+    @property
+    def pads_clearance(self) -> float:
+        """Least distance of the middle of the pads from the table, metres.
+
+        On a slope a corner of the pads is nearer to the table than their middle.
+        """
+        return self.clearance + PAD_CORNER * float(np.linalg.norm(self.table_slope))
+
     def lowest_grasp_z(self, xy: np.ndarray) -> np.ndarray:
         """Least z (...) of grasps at points (..., 2) whose pads keep clear of the table, metres."""
-        # On a slope a corner of the pads is nearer to the table than their middle.
-        corner = PAD_CORNER * float(np.linalg.norm(self.table_slope))
         table = plane_height(xy, self.table_z, self.table_slope, self.centre)
-        return table + corner + PAD_REACH + self.clearance
+        return table + PAD_REACH + self.pads_clearance
 
 
 class PartFeeder(Protocol):

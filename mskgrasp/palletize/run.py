@@ -115,7 +115,7 @@ def palletize(config: PalletizeConfig) -> PlacementSummary:
     tell_model(models, cell)
     with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=may_change):
         if config.planner.policy == "certified":
-            certify_missing(names, config.models, config.workers, clearance=cell.workspace.clearance)
+            certify_missing(names, config.models, config.workers, clearance=cell.workspace.pads_clearance)
             keep_certified(config.out, names)
         make_folder(config.out / "placements")
         for leftover in (config.out / "placements").glob("*.tmp"):

@@ -32,7 +32,7 @@ class CellFile:
         values: Its contents with the overrides.
         tape: Sizes of the tape squares that measure; None where a tracker measures.
         simulated: Whether the cell is simulated, so that several can run in parallel.
-        clearance: Least distance of the pads from its table, metres.
+        clearance: Least distance of the middle of the pads from its table, metres.
     """
 
     path: Path
@@ -110,7 +110,11 @@ def read_cell(
         squares = check_config(Tape, squares, "--tape" if tape else f"{path}: tape")
     cell_from_values(values, path)  # refuses an invalid file before any worker starts
     return CellFile(
-        path=path, values=values, tape=squares, simulated=cell.simulated, clearance=cell.workspace.clearance
+        path=path,
+        values=values,
+        tape=squares,
+        simulated=cell.simulated,
+        clearance=cell.workspace.pads_clearance,
     )
 
 

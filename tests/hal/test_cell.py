@@ -43,3 +43,13 @@ def test_the_lowest_grasp_over_a_slope_keeps_every_corner_of_the_pads_clear():
         )
         table = 0.01 * (corners[:, 0] - 0.5) - 0.02 * corners[:, 1]
         assert 0.003 <= (corners[:, 2] - table).min() < 0.006
+
+
+def test_the_pads_keep_their_clearance_and_on_a_slope_what_their_corners_need():
+    sloping = replace(WORKSPACE, clearance=0.003, table_slope=(0.0, 0.02))
+    level = replace(sloping, table_slope=(0.0, 0.0))
+    assert level.pads_clearance == 0.003
+    rise = sloping.lowest_grasp_z(sloping.centre) - level.lowest_grasp_z(level.centre)
+    assert rise == pytest.approx(sloping.pads_clearance - 0.003)
+    # A corner of the pads is 57 mm from the middle of the hand.
+    assert rise == pytest.approx(0.02 * 0.057, abs=3e-5)
