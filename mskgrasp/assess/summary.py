@@ -37,6 +37,7 @@ class Row:
         planner: Name of what planned the grasps.
         certified: Share planned by a certified grasp.
         uncertified: Number planned by a simulated grasp that is not certified.
+        networks: Number planned by the networks; of the others nothing was planned.
         lifted: Share lifted.
         within: By correction, the share of all attempts placed within the tolerance.
         within_distance: The same within each of `DISTANCES`, whatever the turn.
@@ -50,6 +51,7 @@ class Row:
     planner: PlannerName
     certified: Share
     uncertified: int
+    networks: int
     lifted: Share
     within: dict[Correction, Share]
     within_distance: dict[Correction, tuple[Share, ...]]
@@ -62,17 +64,18 @@ class Row:
     def planned_by(self) -> str:
         """What planned the grasps, in words: where a part has no certified grasp others did."""
         n, of = self.certified.n, self.certified.of
-        others = of - n - self.uncertified
         if self.planner == "networks":
             return "the networks"
-        if others == of:
+        if of and self.networks == of:
             return "the networks (no certified grasp)"
         counts = {"certified grasps": n, "uncertified ones": self.uncertified}
         used = {name: count for name, count in counts.items() if count}
         if of in used.values():
             return next(iter(used)) + ("" if n else " (no certified grasp)")
         planned = " and ".join(f"{name} in {count}" for name, count in used.items())
-        return f"{planned} of {of} attempts" + (", else the networks" if others else "")
+        if not used:
+            return f"the networks in {self.networks} of {of} attempts"
+        return f"{planned} of {of} attempts" + (", else the networks" if self.networks else "")
 
     @property
     def advice(self) -> Correction | None:
@@ -86,6 +89,7 @@ class Row:
             planner=self.planner,
             certified=self.certified.to_json(),
             uncertified=self.uncertified,
+            networks=self.networks,
             lifted=self.lifted.to_json(),
             within={name: share.to_json() for name, share in self.within.items()},
             within_distance={
@@ -138,6 +142,7 @@ def _row(
         planner=planner,
         certified=Share.count([trial.planned_by == "certified" for trial in trials], parts),
         uncertified=sum(trial.planned_by == "uncertified" for trial in trials),
+        networks=sum(trial.planned_by == "networks" for trial in trials),
         lifted=Share.count([trial.lifted for trial in trials], parts),
         within={one: within(one, tolerance.distance, tolerance.angle) for one in CORRECTIONS},
         within_distance={
