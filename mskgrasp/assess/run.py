@@ -19,6 +19,7 @@ from mskgrasp.assess.trials import EXACT, AssessSetup, scene_tasks, trial_bench,
 from mskgrasp.core.errors import BadPart, MskgraspError, UsageError
 from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
+from mskgrasp.parts.builtin import is_known
 from mskgrasp.parts.importing.mesh_files import LOADERS
 from mskgrasp.planning.certified import FILE, CertifiedGrasps
 from mskgrasp.planning.for_cell import check_unit, part_name
@@ -100,6 +101,8 @@ def _sources(config: AssessConfig) -> list[str]:
         path = Path(text)
         if path.is_dir() and not (path / "part.json").exists():
             files = sorted(str(file) for file in path.iterdir() if file.suffix.lower() in LOADERS)
+            if not files and is_known(text):  # a folder of results, which has the name of its part
+                files = [text]
             if not files:
                 raise UsageError(
                     f"{text} holds no CAD file ({' '.join(sorted(LOADERS))}); name one, or another folder"

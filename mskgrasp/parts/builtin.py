@@ -86,6 +86,11 @@ def is_built(name: str) -> bool:
     return store.stored_recipe_hash(store.parts_folder() / name) == recipe_hash(name)
 
 
+def is_known(name: str) -> bool:
+    """Whether a name is that of a built-in part or of one in the parts folder."""
+    return name in _recipes() or bool(LEGAL_NAME.fullmatch(name) and (store.parts_folder() / name).is_dir())
+
+
 def find_part(name_or_folder: str | Path) -> Part:
     """A part by its name or by its folder; a built-in one is built where it is missing.
 
@@ -99,7 +104,7 @@ def find_part(name_or_folder: str | Path) -> Part:
             return build_part(text)
         except BadPart as error:
             raise BadPart(f"{text}: {error}") from error
-    if LEGAL_NAME.fullmatch(text) and (store.parts_folder() / text).is_dir():
+    if is_known(text):
         return store.read_part(store.parts_folder() / text)
     if Path(text).is_dir():
         return store.read_part(Path(text))

@@ -140,6 +140,13 @@ def test_two_part_folders_of_one_name_are_refused(tmp_path):
         _sources(AssessConfig(parts=(str(tmp_path / "one"), str(tmp_path / "two"))))
 
 
+def test_a_folder_of_results_in_this_directory_does_not_hide_the_part_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hex_nut_m20").mkdir()
+    (tmp_path / "hex_nut_m20" / "report.html").touch()
+    assert _sources(AssessConfig(parts=("hex_nut_m20",))) == ["hex_nut_m20"]
+
+
 def test_a_file_that_is_named_twice_is_one_part(cad, monkeypatch):
     monkeypatch.chdir(cad)
     (cad / "plate.stl").touch()
