@@ -49,7 +49,8 @@ class BenchmarkConfig(Config):
     paper_models: Path | None = None
     """Folder of the paper's networks, trained with configs/train/paper.yaml."""
     out: Path = Path("out/benchmark")
-    """Folder for report.html, report.json and trials.jsonl."""
+    """Folder for report.html, report.json and trials.jsonl; with --grasps of what is written, by default
+    that of the file."""
     grasps: Path | None = None
     """Score the top-down grasps of a file in the isaac_grasp format instead, for --part."""
     part: str = ""

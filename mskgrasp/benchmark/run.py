@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 from collections.abc import Callable, Mapping, Sequence
@@ -156,7 +157,7 @@ def program_digests(command: str) -> dict[str, str]:
     """A program's command, and digests of the files that it names; of what these read nothing is known."""
     words = shlex.split(command)
     paths = dict(zip(words, [Path(shutil.which(words[0]) or words[0]), *map(Path, words[1:])], strict=True))
-    files = {f"program: {word}": file_digest(path) for word, path in paths.items() if path.is_file()}
+    files = {f"program: {word}": file_digest(path) for word, path in paths.items() if os.path.isfile(path)}
     return {"program": command} | files
 
 

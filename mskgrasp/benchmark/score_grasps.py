@@ -68,8 +68,9 @@ def score_file(config: BenchmarkConfig, path: Path) -> None:
         else:
             found[name] = grasp
     scores = score(part, models, found) if found else {}
-    make_folder(config.out)
-    out = config.out / f"{path.stem}.scored.yaml"
+    folder = config.out if "out" in config.model_fields_set else path.parent
+    make_folder(folder)
+    out = folder / f"{path.stem}.scored.yaml"
     write_scored(out, read, scores)
     print(f"scored {len(scores)} of {len(read.T_mesh_tcp)} grasps of {part.name}")
     for name, one in sorted(scores.items(), key=lambda item: -item[1]["confidence"]):

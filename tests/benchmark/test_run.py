@@ -59,6 +59,11 @@ def test_a_program_that_is_edited_is_another_one(tmp_path):
     }
 
 
+def test_a_program_may_be_a_long_line(tmp_path):
+    command = f"python3 -c '{'x = 1; ' * 100}'"
+    assert program_digests(command)["program"] == command
+
+
 def test_a_set_without_a_part_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("mskgrasp.benchmark.run.part_names", lambda *_: [])
     done = run(tmp_path / "out", "--parts", "test")

@@ -64,6 +64,17 @@ def test_top_down_grasps_get_confidence_displacement_and_covariance(tmp_path):
     assert found["good"]["resting"] == found["turned"]["resting"]
 
 
+def test_scores_are_written_beside_the_grasps_where_no_folder_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").mkdir()
+    path = tmp_path / "mine" / "grasps.yaml"
+    written(path, np.array(read_record(PART.folder)["centroid_in_source"]))
+    done = run_here(main, "--grasps", str(path), "--part", PART.name)
+    assert done.returncode == 0, done.stderr
+    assert {one.name for one in path.parent.iterdir()} == {"grasps.yaml", "grasps.scored.yaml"}
+    assert not (tmp_path / "out").exists()  # where a benchmark without --out is refused beside other files
+
+
 def test_grasps_of_a_pose_that_the_camera_does_not_see_are_left_out(tmp_path, capsys):
     part = make_box(tmp_path, "sheet", (0.06, 0.03, 0.0015), 0.02)
     poses = np.argsort(part.resting.position[:, 2])
