@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.special import betainc, betaln, ndtr, ndtri, stdtrit
 
 from mskgrasp.core.geometry import wrap_angle
@@ -282,7 +282,7 @@ def share_interval(n_success: np.ndarray, n: np.ndarray, level: float = 0.95) ->
             cumulative = betainc(share * effective + 0.5, (1 - share) * effective + 0.5, value)
             return float(posterior @ cumulative) - probability
 
-        return brentq(below, 0.0, 1.0)
+        return float(root_scalar(below, bracket=(0.0, 1.0)).root)
 
     low, high = (end(tail) for tail in ((1 - level) / 2, (1 + level) / 2))
     return 0.0 if share == 0.0 else low, 1.0 if share == 1.0 else high
