@@ -144,11 +144,18 @@ def gain_lines(summary: PlacementSummary) -> list[str]:
         turn = _ratio_text(gain.rotation_ratio, gain.rotation_ratio_interval)
         text = f"Corrected by {_WORDS[name]}, the median error is {ratio} of that without, the turn's {turn}"
         if name == "predicted" and gain.translation_ratio is not None:
-            met = "met" if gain.translation_ratio <= GOAL else "not met"
-            judged = met if parts >= LEAST_PARTS else f"not judged by {parts} parts, {LEAST_PARTS} are needed"
-            text += f"; the goal is {GOAL:g} at most: {judged}"
+            judged = verdict(gain.translation_ratio, gain.translation_ratio_interval)
+            few = f"not judged by {parts} parts, {LEAST_PARTS} are needed"
+            text += f"; the goal is {GOAL:g} at most: {judged if parts >= LEAST_PARTS else few}"
         lines.append(text + ".")
     return lines
+
+
+def verdict(ratio: float, interval: Interval | None) -> str:
+    """Say whether a ratio of median errors meets the goal, and whether its interval does."""
+    if ratio > GOAL:
+        return "not met"
+    return "met" if interval is not None and interval[1] <= GOAL else "met, but not by the whole interval"
 
 
 def _ratio_text(ratio: float | None, interval: Interval | None) -> str:

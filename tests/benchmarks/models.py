@@ -273,7 +273,7 @@ def compare(
             for name in progress(list(each[group]), unit="model", title=f"score {group} parts")
         }
         scores[group] = {name: one.to_json() for name, one in of_group.items()}
-        n_parts = of_group[NOTHING].parts
+        n_parts = len(samples.part[rows[group]].unique())
         caption = f"{title}: {len(rows[group])} grasps of {n_parts} parts"
         tables += [score_table(of_group, bold=OURS, caption=caption), coverage_table(of_group)]
     for reference in dict.fromkeys((choices[0].name, PAPER_AS_OURS)):

@@ -238,7 +238,8 @@ def _size(report: dict[str, Any]) -> str:
         return f"{attempts} attempts at {len(report['parts'])} parts, seed {report['seed']}"
     if "experiment" in report:
         settings = report["settings"]
-        families = f" of {len(report['families'])} families" if "families" in report else ""
+        count = len(report.get("families", []))
+        families = f" of {count} families" if count > 1 else ""
         return (
             f"{len(report['trials'])} trials, {settings['trials']} a part and policy; "
             f"{len(settings['parts'])} parts{families}, seed {settings['seed']}"
