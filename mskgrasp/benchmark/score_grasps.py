@@ -68,7 +68,7 @@ def score_file(config: BenchmarkConfig, path: Path) -> None:
         else:
             found[name] = grasp
     scores = score(part, models, found) if found else {}
-    folder = config.out if "out" in config.model_fields_set else path.parent
+    folder = path.parent if config.out == BenchmarkConfig().out else config.out
     make_folder(folder)
     out = folder / f"{path.stem}.scored.yaml"
     write_scored(out, read, scores)
