@@ -3,47 +3,101 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
+from typing import Annotated, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 from scipy.special import ndtri
 
+from mskgrasp.core.config import Config
 from mskgrasp.core.metrics import standardised_error
 
 LEVELS = (*np.round(np.arange(0.05, 0.951, 0.05), 2).tolist(), 0.99)
 """Probabilities of the central intervals that a table of half widths lists."""
+_GROUPS, _LEAST_IN_A_GROUP = 12, 200
+"""Groups of predictions by their deviation: at most so many, each of at least so many."""
+_Row = tuple[Annotated[float, Field(gt=0.0)], ...]
+HalfWidth = Callable[[float, np.ndarray], float | np.ndarray]
+"""Half width, in predicted standard deviations, of the central interval of a probability; from the
+probability and the predicted variances (n, k), a number or (n, k)."""
 
 
-def normal_half_width(level: float) -> float:
+def normal_half_width(level: float, variance: np.ndarray | None = None) -> float:
     """Half width of the central interval of probability ``level``, in standard deviations of a normal."""
     return float(ndtri((1 + level) / 2))
 
 
-def measured_half_widths(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Half widths (`LEVELS`, k), in predicted deviations, of intervals that hold these true (n, k).
+class IntervalTable(Config):
+    """Half widths of central intervals, which depend on the predicted deviation.
 
-    The quantiles of |error| / deviation: normalised conformal prediction (Papadopoulos et al. 2008).
+    Errors are not normal: most parts do not rise in the hand, some do by 10 mm. The less a network is sure,
+    the more they are.
+    """
+
+    deviations: tuple[_Row, ...] = Field(min_length=1)
+    """Medians (b, k) of the predicted standard deviations of b groups of predictions, metres and radians."""
+    half_widths: tuple[tuple[_Row, ...], ...]
+    """Half widths (b, `LEVELS`, k) of each group, in predicted standard deviations."""
+
+    @model_validator(mode="after")
+    def _wider_intervals_hold_more(self) -> Self:
+        if len(self.half_widths) != len(self.deviations):
+            raise ValueError(f"{len(self.deviations)} deviations, half widths of {len(self.half_widths)}")
+        tables = (self.deviations, *self.half_widths)
+        for group in self.half_widths:
+            if len(group) != len(LEVELS):
+                raise ValueError(f"half_widths has {len(group)} rows, {len(LEVELS)} are needed")
+        if len({len(row) for table in tables for row in table}) > 1 or any(
+            more < less
+            for table in tables
+            for one, next_ in pairwise(table)
+            for less, more in zip(one, next_, strict=True)
+        ):
+            raise ValueError("deviations, half_widths: rows of one length, each no less than the one before")
+        return self
+
+    def half_width(self, level: float, variance: np.ndarray) -> np.ndarray:
+        """Half widths (n, k) of the central interval of probability ``level``, in predicted deviations.
+
+        Between the levels of the table the ratio to a normal's half width is interpolated, between its
+        deviations the logarithm; beyond, the last is kept.
+
+        Args:
+            level: Probability.
+            variance: (n, k) predicted; of fewer components, the first.
+        """
+        normal = np.array([normal_half_width(each) for each in LEVELS])
+        width = normal_half_width(level)
+        ratios = np.array(self.half_widths) / normal[:, None]
+        at_level = [[width * np.interp(width, normal, column) for column in group.T] for group in ratios]
+        known, logs = np.log(self.deviations), np.log(at_level)
+        asked = np.log(np.asarray(variance, dtype=np.float64)) / 2
+        found = [np.interp(x, xp, fp) for x, xp, fp in zip(asked.T, known.T, logs.T, strict=False)]
+        return np.exp(np.stack(found, axis=1))
+
+
+def measured_intervals(mean: np.ndarray, variance: np.ndarray, true: np.ndarray) -> IntervalTable:
+    """Measure the intervals that hold these true values (n, k).
+
+    The quantiles of |error| / deviation (normalised conformal prediction, Papadopoulos et al. 2008), in
+    groups of similar deviation, as many in each.
     """
     error = np.abs(standardised_error(mean, variance, true))
-    return np.quantile(error, LEVELS, axis=0)
+    deviation = np.sqrt(np.asarray(variance, dtype=np.float64))
+    n_groups = int(np.clip(len(error) // _LEAST_IN_A_GROUP, 1, _GROUPS))
+    groups = np.array_split(np.argsort(deviation, axis=0, kind="stable"), n_groups)
+    widths = [np.quantile(np.take_along_axis(error, group, axis=0), LEVELS, axis=0) for group in groups]
+    medians = [np.median(np.take_along_axis(deviation, group, axis=0), axis=0) for group in groups]
+    return IntervalTable(
+        deviations=tuple(_rounded(row) for row in medians),
+        half_widths=tuple(tuple(_rounded(np.maximum(row, 1e-6)) for row in rows) for rows in widths),
+    )
 
 
-def half_width_of(table: np.ndarray, level: float) -> np.ndarray:
-    """Half widths (k,) of the central interval of probability ``level``, from a table of them.
-
-    Between the levels of the table the ratio to a normal's half width is interpolated; beyond, it is kept.
-
-    Args:
-        table: (`LEVELS`, k) in standard deviations.
-        level: Probability.
-    """
-    normal = np.array([normal_half_width(each) for each in LEVELS])
-    ratio = np.asarray(table, dtype=np.float64) / normal[:, None]
-    width = normal_half_width(level)
-    return width * np.array([np.interp(width, normal, column) for column in ratio.T])
-
-
-HalfWidth = Callable[[float], float | np.ndarray]
-"""Half width, or one a component (k,), of the central interval of a probability, in standard deviations."""
+def _rounded(values: np.ndarray) -> tuple[float, ...]:
+    """To four digits: a table is a tenth of a model's description."""
+    return tuple(float(f"{value:.4g}") for value in values)
 
 
 def coverage(
@@ -56,7 +110,7 @@ def coverage(
     """Share of true values inside the central interval of probability ``level``, per axis (k,)."""
     if not len(true):
         return np.full(np.shape(true)[1], np.nan)
-    return (np.abs(standardised_error(mean, variance, true)) <= half_width(level)).mean(axis=0)
+    return (np.abs(standardised_error(mean, variance, true)) <= half_width(level, variance)).mean(axis=0)
 
 
 def calibration_error(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -21,7 +20,7 @@ from mskgrasp.core.errors import BadModel, MissingModel
 from mskgrasp.core.files import read_bounded, write_whole
 from mskgrasp.core.grasp import HAND_GEOMETRY, SAME_HAND
 from mskgrasp.core.json_text import parse_json
-from mskgrasp.core.predicted_intervals import LEVELS, half_width_of, normal_half_width
+from mskgrasp.core.predicted_intervals import IntervalTable, normal_half_width
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.learning.hand_features import HandFeatures
 from mskgrasp.learning.label_source import LabelSource
@@ -29,9 +28,9 @@ from mskgrasp.learning.network_config import NetworkConfig, Normalisation
 from mskgrasp.learning.networks import GraspDisplacementNetwork, GraspQualityNetwork
 from mskgrasp.learning.symmetry import N_VIEWS, views
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 MOST_BYTES = 2**24
-"""Largest description of a model; the shipped one has 66 kB."""
+"""Largest description of a model; the shipped one has 90 kB."""
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
 
@@ -44,29 +43,17 @@ class ModelCalibration(Config):
     """Platt scaling of the quality (1999): its log odds become slope * log odds + offset."""
     variance_scale: tuple[Annotated[float, Field(gt=0.0)], ...] = ()
     """Factor of each variance, so that the central 90 % interval holds 90 %; empty: 1."""
-    half_widths: tuple[tuple[Annotated[float, Field(gt=0.0)], ...], ...] = ()
-    """Half widths of the central intervals of `LEVELS`, in standard deviations
-    of each component; empty: a normal distribution's.
+    intervals: IntervalTable | None = None
+    """Widths of the central intervals of all probabilities; None: a normal distribution's."""
 
-    Most parts do not rise in the hand, some do by 10 mm: no normal distribution has such tails.
-    """
+    def half_width(self, level: float, variance: np.ndarray) -> float | np.ndarray:
+        """Half widths (n, k) of the central interval of a probability, in predicted standard deviations.
 
-    @model_validator(mode="after")
-    def _wider_intervals_hold_more(self) -> Self:
-        table = self.half_widths
-        if table and len(table) != len(LEVELS):
-            raise ValueError(f"half_widths has {len(table)} rows, {len(LEVELS)} are needed")
-        if len({len(row) for row in table}) > 1 or any(
-            wide < narrow for one, next_ in pairwise(table) for narrow, wide in zip(one, next_, strict=False)
-        ):
-            raise ValueError("half_widths must have rows of one length, each no less than the one before")
-        return self
-
-    def half_width(self, level: float) -> float | np.ndarray:
-        """Half widths (k,) of the central interval of a probability, in predicted standard deviations."""
-        if not self.half_widths:
-            return normal_half_width(level)
-        return half_width_of(np.array(self.half_widths), level)
+        Args:
+            level: Probability.
+            variance: (n, k) predicted.
+        """
+        return (self.intervals.half_width if self.intervals else normal_half_width)(level, variance)
 
 
 class ModelMeta(Config):
@@ -83,12 +70,12 @@ class ModelMeta(Config):
 
     @model_validator(mode="after")
     def _numbers_fit_the_network(self) -> ModelMeta:
-        n, half_widths = self.network.n_outputs, self.calibration.half_widths
+        n, intervals = self.network.n_outputs, self.calibration.intervals
         sizes = {
             "normalisation.target_mean": len(self.normalisation.target_mean),
             "normalisation.target_std": len(self.normalisation.target_std),
             "calibration.variance_scale": len(self.calibration.variance_scale) or n,
-            "calibration.half_widths": len(half_widths[0]) if half_widths else n,
+            "calibration.intervals": len(intervals.deviations[0]) if intervals else n,
         }
         for name, size in sizes.items():
             if size != n:

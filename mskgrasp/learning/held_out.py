@@ -15,8 +15,7 @@ from mskgrasp.core.predicted_intervals import (
     HalfWidth,
     calibration_error,
     coverage,
-    half_width_of,
-    measured_half_widths,
+    measured_intervals,
     normal_half_width,
 )
 from mskgrasp.learning.grasp_models import ModelCalibration, Models
@@ -102,21 +101,21 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
 
     The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
     (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole
-    distribution; the intervals of other probabilities get the widths that hold as much.
+    distribution; intervals of any probability get the widths that hold as much, by the deviation.
     """
     quality = predict_quality(models, samples, rows)
     slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
-    scale, half_widths = (), ()
+    scale, intervals = (), None
     held = rows[samples.success[rows]]
     mean, variance = predict_grasp_displacement(models, samples, held)
     if np.isfinite(variance).all() and len(held) >= _LEAST_TO_SCALE:
         target = samples.targets(held, models.meta.network).double().numpy()
-        widths = measured_half_widths(mean, variance, target)
-        deviation = half_width_of(widths, 0.9) / normal_half_width(0.9)
+        error = np.abs(metrics.standardised_error(mean, variance, target))
+        deviation = np.quantile(error, 0.9, axis=0) / normal_half_width(0.9)
         scale = tuple(np.maximum(deviation**2, 1e-6))
-        half_widths = tuple(map(tuple, np.maximum(widths / np.sqrt(scale), 1e-6).tolist()))
+        intervals = measured_intervals(mean, variance * scale, target)
     return ModelCalibration(
-        quality_slope=slope, quality_offset=offset, variance_scale=scale, half_widths=half_widths
+        quality_slope=slope, quality_offset=offset, variance_scale=scale, intervals=intervals
     )
 
 

@@ -168,16 +168,21 @@ def train(
 
         stage.run(history, reporter, done=done, best=best, save=save)
 
+    return _measured(models, samples, sides, config), history
+
+
+def _measured(models: Models, samples: Samples, sides: Sides, config: LearningConfig) -> Models:
+    """Trained networks with their calibration, if it is wanted, and their metrics on held-out parts."""
     if config.calibrate:
         found = held_out.calibrate(models, samples, sides.validation)
-        models = replace(models, meta=meta.model_copy(update={"calibration": found}))
+        models = replace(models, meta=models.meta.model_copy(update={"calibration": found}))
     # Of random grasps, so that models can be compared whether they learned from planned ones or not.
     random = sides.validation[~samples.planned[sides.validation]]
     stored = held_out.measure_models(models, samples, sides.training, random).to_json()
     for side, rows in (("test", sides.test), ("new_sizes", sides.new_sizes)):
         if len(rows):
             stored[side] = held_out.measure_models(models, samples, sides.training, rows).to_json()
-    return replace(models, meta=models.meta.model_copy(update={"metrics": stored})), history
+    return replace(models, meta=models.meta.model_copy(update={"metrics": stored}))
 
 
 def _resumable(path: Path, samples: Samples, sides: Sides, stages: list[str]) -> Checkpoint | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mskgrasp.core.files import write_whole
-from mskgrasp.core.predicted_intervals import half_width_of, normal_half_width
+from mskgrasp.core.predicted_intervals import IntervalTable, normal_half_width
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import ModelMeta, Models
 from mskgrasp.learning.network_config import NetworkConfig
@@ -71,19 +71,19 @@ class Predictions:
         quality: (n,) probabilities of success; empty without a quality network.
         mean: (m, k) grasp displacement, metres and radians.
         variance: (m, k), NaN where none is predicted.
-        half_widths: Of the intervals, as in `ModelCalibration`; empty: those of normal distributions.
+        intervals: `IntervalTable` as JSON; empty: those of normal distributions.
     """
 
     quality: np.ndarray
     mean: np.ndarray
     variance: np.ndarray
-    half_widths: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    intervals: np.ndarray = field(default_factory=lambda: np.array(""))
 
-    def half_width(self, level: float) -> float | np.ndarray:
-        """Half widths (4,) of the central interval of a probability, in predicted standard deviations."""
-        if not self.half_widths.size:
-            return normal_half_width(level)
-        return half_width_of(self.half_widths[:, :4], level)
+    def half_width(self, level: float, variance: np.ndarray) -> float | np.ndarray:
+        """Half widths of the central interval of a probability, in predicted standard deviations."""
+        if text := str(self.intervals):
+            return IntervalTable.model_validate_json(text).half_width(level, variance)
+        return normal_half_width(level)
 
     def write(self, path: Path) -> None:
         """Store them atomically."""

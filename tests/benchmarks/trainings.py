@@ -183,8 +183,9 @@ def predicted(models: Models, samples: Samples, rows: Tensor, *, quality: bool) 
     """Predict for some rows: the quality of all, if wanted, and the displacement of the successful ones."""
     mean, variance = held_out.predict_grasp_displacement(models, samples, rows[samples.success[rows]])
     probability = held_out.predict_quality(models, samples, rows) if quality else np.zeros(0)
-    half_widths = np.array(models.meta.calibration.half_widths, ndmin=2)
-    return Predictions(quality=probability, mean=mean, variance=variance, half_widths=half_widths)
+    table = models.meta.calibration.intervals
+    intervals = np.array(table.model_dump_json() if table else "")
+    return Predictions(quality=probability, mean=mean, variance=variance, intervals=intervals)
 
 
 def _trained(

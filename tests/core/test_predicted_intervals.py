@@ -8,10 +8,10 @@ from scipy.stats import norm
 
 from mskgrasp.core.predicted_intervals import (
     LEVELS,
+    IntervalTable,
     calibration_error,
     coverage,
-    half_width_of,
-    measured_half_widths,
+    measured_intervals,
     normal_half_width,
 )
 
@@ -36,23 +36,45 @@ def test_measured_half_widths_hold_as_much_of_other_errors_with_heavy_tails():
         return found * [1, 1, 1, 0.1]
 
     variance = (std * [1, 1, 1, 0.1]) ** 2
-    table = measured_half_widths(np.zeros_like(std), variance, errors())
+    half_width = measured_intervals(np.zeros_like(std), variance, errors()).half_width
     other = errors()
     for level in (0.2, 0.5, 0.63, 0.8, 0.9, 0.95, 0.99):
-        covered = coverage(
-            np.zeros_like(std), variance, other, level, lambda level: half_width_of(table, level)
+        assert np.allclose(
+            coverage(np.zeros_like(std), variance, other, level, half_width), level, atol=0.012
         )
-        assert np.allclose(covered, level, atol=0.012)
-        assert half_width_of(table, level)[2] == pytest.approx(norm.ppf((1 + level) / 2), rel=0.03)
+        widths = half_width(level, variance)[:, 2]
+        assert np.median(widths) == pytest.approx(norm.ppf((1 + level) / 2), rel=0.03)
     # A normal's width holds all of one half, and of the other what lies within a third of it.
     expected = 0.5 + 0.5 * (2 * norm.cdf(norm.ppf(0.75) / 3) - 1)
     assert coverage(np.zeros_like(std), variance, other, 0.5)[0] == pytest.approx(expected, abs=0.01)
 
 
-def test_half_widths_beyond_the_table_grow_as_a_normals():
-    table = np.array([[2 * normal_half_width(level)] for level in LEVELS])
-    assert half_width_of(table, 0.999) == pytest.approx(2 * norm.ppf(0.9995))
-    assert half_width_of(table, 0.01) == pytest.approx(2 * norm.ppf(0.505))
+def test_intervals_hold_their_share_of_sure_and_of_unsure_predictions():
+    """The surer a prediction, the less it errs for its deviation, as where a planner chose the grasp."""
+    rng = np.random.default_rng(0)
+    std = np.exp(rng.normal(size=(40_000, 4)))
+    errors = rng.normal(size=std.shape) * std * np.where(std < 1, std, 1)
+    fitted, other = slice(0, 20_000), slice(20_000, None)
+    zero, variance = np.zeros_like(std), std**2
+    table = measured_intervals(zero[fitted], variance[fitted], errors[fitted])
+    for sure in (std[other, 0] < 0.5, std[other, 0] > 1.5):
+        for level in (0.5, 0.9, 0.95):
+            some = [values[other][sure] for values in (zero, variance, errors)]
+            assert coverage(*some, level, table.half_width)[0] == pytest.approx(level, abs=0.03)
+    assert coverage(*(values[other][std[other, 0] < 0.5] for values in (zero, variance, errors)))[0] > 0.99
+
+
+def test_half_widths_beyond_the_table_grow_as_a_normals_and_those_of_its_ends_are_kept():
+    column = [(2 * normal_half_width(level),) for level in LEVELS]
+    wide = [(2 * row[0],) for row in column]
+    table = IntervalTable(deviations=((0.1,), (10.0,)), half_widths=(tuple(column), tuple(wide)))
+
+    def width(level: float, deviation: float) -> float:
+        return float(table.half_width(level, np.array([[deviation**2]]))[0, 0])
+
+    assert width(0.999, 0.1) == width(0.999, 0.01) == pytest.approx(2 * norm.ppf(0.9995))
+    assert width(0.01, 10.0) == width(0.01, 99.0) == pytest.approx(4 * norm.ppf(0.505))
+    assert width(0.9, 1.0) == pytest.approx(2 * np.sqrt(2) * norm.ppf(0.95))  # half way by the logarithm
 
 
 def test_calibration_error_is_none_of_honest_gaussians_and_large_of_boastful_ones():

@@ -54,6 +54,10 @@ def _each(operation: Callable[[torch.Tensor], Any]) -> Callable[[Place], str]:
     return change
 
 
+def _intervals(half_widths: list[list[float]]) -> dict[str, Any]:
+    return {"deviations": [[0.001] * len(half_widths[0])], "half_widths": [half_widths]}
+
+
 ROWS = [
     _of(
         "plan",
@@ -64,20 +68,20 @@ ROWS = [
     _of(
         "plan",
         "intervals that become narrower",
-        lambda at: at.model(calibration__half_widths=[[1.0 - 0.01 * k] * 4 for k in range(20)]),
-        "'calibration': .*no less than the one before",
+        lambda at: at.model(calibration__intervals=_intervals([[1.0 - 0.01 * k] * 4 for k in range(20)])),
+        "'calibration.intervals': .*no less than the one before",
     ),
     _of(
         "plan",
         "too few intervals",
-        lambda at: at.model(calibration__half_widths=[[1.0] * 4]),
-        "'calibration': .*20 are needed",
+        lambda at: at.model(calibration__intervals=_intervals([[1.0] * 4])),
+        "'calibration.intervals': .*20 are needed",
     ),
     _of(
         "plan",
         "intervals of too few components",
-        lambda at: at.model(calibration__half_widths=[[1.0, 1.0]] * 20),
-        "half_widths has 2 numbers, the network predicts 4",
+        lambda at: at.model(calibration__intervals=_intervals([[1.0, 1.0]] * 20)),
+        "intervals has 2 numbers, the network predicts 4",
     ),
     _of(
         "evaluate",
@@ -115,19 +119,19 @@ ROWS = [
         "palletize",
         "a description of another schema",
         lambda at: at.model(schema_version=99),
-        "schema version 99, legal: 1",
+        "schema version 99, legal: 2",
     ),
     _of("plan", "a description that is a list", _described("[]"), "schema version None|is damaged"),
     _of(
         "plan",
         "a description without a network",
-        _described('{"schema_version": 1}'),
+        _described('{"schema_version": 2}'),
         "'network': field required",
     ),
     _of(
         "plan",
         "a key twice",
-        _described('{"schema_version": 1, "schema_version": 1}'),
+        _described('{"schema_version": 2, "schema_version": 2}'),
         "key 'schema_version' occurs twice",
     ),
     _of("plan", "an unknown key", lambda at: at.model(layers_of="x"), "'layers_of': .*not permitted"),
