@@ -96,7 +96,7 @@ def measured_intervals(mean: np.ndarray, variance: np.ndarray, true: np.ndarray)
 
 
 def _rounded(values: np.ndarray) -> tuple[float, ...]:
-    """To four digits: a table is a tenth of a model's description."""
+    """To four digits: a table is a quarter of the description of a model."""
     return tuple(float(f"{value:.4g}") for value in values)
 
 

@@ -30,7 +30,7 @@ from mskgrasp.learning.symmetry import N_VIEWS, views
 
 SCHEMA_VERSION = 2
 MOST_BYTES = 2**24
-"""Largest description of a model; the shipped one has 90 kB."""
+"""Largest description of a model; the shipped one has 130 kB."""
 WEIGHTS = "model.safetensors"
 DESCRIPTION = "model.json"
 
