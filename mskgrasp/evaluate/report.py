@@ -42,9 +42,13 @@ _ERRORS_EXPLAINED = (
     "RMSE: of the predicted displacement in the hand, over the grasps that lifted the part and were "
     "measured; RMSE if none predicted: of predicting that nothing moves, over the same grasps."
 )
+_INTERVALS_EXPLAINED = (
+    "The interval of a single part is that of its own rate; of several parts, that of the mean rate of all "
+    "such parts, which a few parts alike leave more open."
+)
 _COMPARISON_EXPLAINED = (
     f"{_ERRORS_EXPLAINED} In brackets: 95 % interval over parts. Inside 90 % interval: share of the measured "
-    "values within the predicted central 90 %. Known parts are those a model was trained on."
+    "values within 1.645 predicted standard deviations. Known parts are those a model was trained on."
 )
 
 
@@ -143,7 +147,7 @@ def _success(summary: SuccessSummary, folder: Path) -> list[Section]:
         *([by_family] if 1 < len(summary.families) < len(summary.parts) else []),
         Section(
             title="Parts",
-            text=[*_success_text(summary), _ERRORS_EXPLAINED],
+            text=[*_success_text(summary), _ERRORS_EXPLAINED, _INTERVALS_EXPLAINED],
             tables=[_success_table("part", summary.parts, summary.overall)],
         ),
         _attempts(("parts",), [(("all",), summary.overall)]),

@@ -72,6 +72,21 @@ def test_single_trials_of_clusters_have_jeffreys_interval_and_a_single_cluster_w
     assert share_interval(np.array([7]), np.array([9])) == wilson_interval(7, 9)
 
 
+def test_the_ends_do_not_depend_on_the_nodes_and_hold_the_share_of_clusters_of_any_size(monkeypatch):
+    rng = np.random.default_rng(0)
+    for k, n, alike in ((60, 200, 0.02), (300, 100, 0.04), (130, 30, 0.3)):
+        a, b = 0.6 * (1 - alike) / alike, 0.4 * (1 - alike) / alike
+        won, tried = rng.binomial(n, rng.beta(a, b, k)), np.full(k, n)
+        usual = share_interval(won, tried)
+        with monkeypatch.context() as finer:
+            finer.setattr(metrics, "_CORRELATIONS", 2 * metrics._CORRELATIONS)
+            finer.setattr(metrics, "_MEANS", 4 * metrics._MEANS)
+            assert usual == pytest.approx(share_interval(won, tried), abs=0.01 * (usual[1] - usual[0]))
+    for won, tried in (([1, 0], [10_000, 10_000]), ([10_000, 0], [10_000, 1])):
+        low, high = share_interval(np.array(won), np.array(tried))
+        assert low <= sum(won) / sum(tried) <= high
+
+
 def test_where_all_clusters_are_alike_they_may_count_as_trials_or_as_one_trial_each():
     low, high = share_interval(np.full(20, 5), np.full(20, 5))
     assert beta.ppf(0.025, 20.5, 0.5) < low < beta.ppf(0.025, 100.5, 0.5) and high == 1.0
