@@ -31,8 +31,8 @@ def normal_half_width(level: float, variance: np.ndarray | None = None) -> float
 class IntervalTable(Config):
     """Half widths of central intervals, which depend on the predicted deviation.
 
-    Errors are not normal: most parts do not rise in the hand, some do by 10 mm. The less a network is sure,
-    the more they are.
+    Errors are not normal: most parts do not rise in the hand, some do by 10 mm. The surer a prediction, the
+    less it errs for its deviation.
     """
 
     deviations: tuple[_Row, ...] = Field(min_length=1)
@@ -60,17 +60,22 @@ class IntervalTable(Config):
     def half_width(self, level: float, variance: np.ndarray) -> np.ndarray:
         """Half widths (n, k) of the central interval of probability ``level``, in predicted deviations.
 
-        Between the levels of the table the ratio to a normal's half width is interpolated, between its
-        deviations the logarithm; beyond, the last is kept.
+        Between the levels of the table the width is interpolated over that of a normal distribution, between
+        its deviations the logarithm over the logarithm. Beyond the levels the ratio to a normal's width is
+        kept, beyond the deviations the width.
 
         Args:
             level: Probability.
             variance: (n, k) predicted; of fewer components, the first.
         """
-        normal = np.array([normal_half_width(each) for each in LEVELS])
+        normal, far = [normal_half_width(each) for each in LEVELS], 100.0
+        known_widths = [0.0, *normal, far * normal[-1]]
+        groups = [
+            np.array([np.zeros(len(group[0])), *group, np.multiply(far, group[-1])])
+            for group in self.half_widths
+        ]
         width = normal_half_width(level)
-        ratios = np.array(self.half_widths) / normal[:, None]
-        at_level = [[width * np.interp(width, normal, column) for column in group.T] for group in ratios]
+        at_level = [[np.interp(width, known_widths, column) for column in group.T] for group in groups]
         known, logs = np.log(self.deviations), np.log(at_level)
         asked = np.log(np.asarray(variance, dtype=np.float64)) / 2
         found = [np.interp(x, xp, fp) for x, xp, fp in zip(asked.T, known.T, logs.T, strict=False)]
@@ -81,23 +86,31 @@ def measured_intervals(mean: np.ndarray, variance: np.ndarray, true: np.ndarray)
     """Measure the intervals that hold these true values (n, k).
 
     The quantiles of |error| / deviation (normalised conformal prediction, Papadopoulos et al. 2008), in
-    groups of similar deviation, as many in each.
+    groups of similar deviation, as many in each; those of equal deviation are taken together.
     """
     error = np.abs(standardised_error(mean, variance, true))
     deviation = np.sqrt(np.asarray(variance, dtype=np.float64))
     n_groups = int(np.clip(len(error) // _LEAST_IN_A_GROUP, 1, _GROUPS))
-    groups = np.array_split(np.argsort(deviation, axis=0, kind="stable"), n_groups)
-    widths = [np.quantile(np.take_along_axis(error, group, axis=0), LEVELS, axis=0) for group in groups]
-    medians = [np.median(np.take_along_axis(deviation, group, axis=0), axis=0) for group in groups]
+    columns = [_measured(*column, n_groups) for column in zip(deviation.T, error.T, strict=True)]
+    medians, widths = (np.stack(some, axis=-1) for some in zip(*columns, strict=True))
     return IntervalTable(
-        deviations=tuple(_rounded(row) for row in medians),
-        half_widths=tuple(tuple(_rounded(np.maximum(row, 1e-6)) for row in rows) for rows in widths),
+        deviations=tuple(tuple(row) for row in medians.tolist()),
+        half_widths=tuple(tuple(tuple(row) for row in rows) for rows in widths.tolist()),
     )
 
 
-def _rounded(values: np.ndarray) -> tuple[float, ...]:
+def _measured(deviation: np.ndarray, error: np.ndarray, n_groups: int) -> tuple[np.ndarray, np.ndarray]:
+    """Median deviations (b,) of groups of rows of one component, and their half widths (b, `LEVELS`)."""
+    groups = np.array_split(np.argsort(deviation, kind="stable"), n_groups)
+    medians = _rounded(np.array([np.median(deviation[group]) for group in groups]))
+    alike = [np.concatenate([groups[k] for k in np.flatnonzero(medians == one)]) for one in medians]
+    widths = np.array([np.quantile(error[group], LEVELS) for group in alike])
+    return medians, _rounded(np.maximum(widths, 1e-6))
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
     """To four digits: a table is a quarter of the description of a model."""
-    return tuple(float(f"{value:.4g}") for value in values)
+    return np.array([float(f"{value:.4g}") for value in values.ravel()]).reshape(values.shape)
 
 
 def coverage(

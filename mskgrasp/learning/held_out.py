@@ -199,7 +199,7 @@ def displacement_metrics(
     )
     return DisplacementMetrics(
         n=len(rows),
-        errors=prediction_errors(samples, rows, mean, variance),
+        errors=prediction_errors(samples, rows, mean, variance, models.meta.calibration.half_width),
         intervals=_rmse_intervals(samples, rows, mean, variance),
         uncertainty=_uncertainty_metrics(samples, rows, mean, variance, models.meta.calibration.half_width),
         zero_displacement=zero,
@@ -313,13 +313,17 @@ def _by_part(samples: Samples, rows: torch.Tensor, values: np.ndarray) -> list[n
 
 
 def prediction_errors(
-    samples: Samples, rows: torch.Tensor, mean: np.ndarray, variance: np.ndarray
+    samples: Samples,
+    rows: torch.Tensor,
+    mean: np.ndarray,
+    variance: np.ndarray,
+    half_width: HalfWidth = normal_half_width,
 ) -> PredictionErrors:
     """Compute RMSE over the displacement of the true centroid, likelihood and coverage over the grasp's."""
     predicted, _ = centroid_displacement(samples, rows, mean, variance)
     displacement = samples.displacement[rows].double().numpy()
     target = true_outcomes(samples, rows, mean)
-    covered = coverage(mean, variance, target)
+    covered = coverage(mean, variance, target, half_width=half_width)
     known = bool(np.isfinite(variance).all())
     return PredictionErrors(
         translation_rmse=metrics.translation_rmse(predicted, displacement),

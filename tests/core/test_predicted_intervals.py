@@ -77,6 +77,26 @@ def test_half_widths_beyond_the_table_grow_as_a_normals_and_those_of_its_ends_ar
     assert width(0.9, 1.0) == pytest.approx(2 * np.sqrt(2) * norm.ppf(0.95))  # half way by the logarithm
 
 
+def test_rows_of_equal_deviation_have_one_interval():
+    """Some parts are better than others, and no deviation tells which."""
+    rng = np.random.default_rng(0)
+    errors = rng.normal(size=(2400, 4)) * np.where(np.arange(2400) < 2200, 1.0, 0.1)[:, None]
+    half = np.where(np.arange(2400) % 2, 1.0, np.exp(rng.normal(size=2400)))
+    for std in (np.ones(2400), half):
+        table = measured_intervals(np.zeros_like(errors), np.tile(std[:, None] ** 2, 4), errors)
+        for level in (0.5, 0.9):
+            some = [v[std == 1.0] for v in (np.zeros_like(errors), np.tile(std[:, None] ** 2, 4), errors)]
+            assert coverage(*some, level, table.half_width)[0] == pytest.approx(level, abs=0.04)
+
+
+def test_a_wider_interval_is_never_of_less_probability():
+    flat = [(min(2.0, 1.1 * normal_half_width(level)),) for level in LEVELS]
+    table = IntervalTable(deviations=((1.0,),), half_widths=(tuple(flat),))
+    levels, one = np.linspace(0.01, 0.999, 200), np.ones((1, 1))
+    widths = [float(table.half_width(level, one)[0, 0]) for level in levels]
+    assert (np.diff(widths) >= 0).all() and max(widths) > 2.0
+
+
 def test_calibration_error_is_none_of_honest_gaussians_and_large_of_boastful_ones():
     rng = np.random.default_rng(0)
     std = rng.uniform(0.001, 0.01, (20_000, 4))
