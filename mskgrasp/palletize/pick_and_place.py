@@ -214,6 +214,8 @@ class PickAndPlace:
                 continue  # the other target may be reached
             except MotionAborted as error:
                 engine.recover(error)
+                if released:  # it stands in the slot
+                    self._tops[known.slot] = float(plan.view.size[2])
                 return replace(known, reason="collided"), target, None
             lies = engine.part_pose()
             if not engine.leave():

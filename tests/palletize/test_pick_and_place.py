@@ -8,10 +8,13 @@ import io
 import numpy as np
 import pytest
 
+from hal.errors import MotionAborted, OutOfWorkspace
 from hal.operator import Operator, StoppedByOperator
 from hal.sim import SapienCellConfig, sapien_cell
+from mskgrasp.core.errors import NoPartFound
 from mskgrasp.core.settings import Tape
 from mskgrasp.core.shipped import PRETRAINED
+from mskgrasp.palletize import pick_and_place
 from mskgrasp.palletize.figures import pallet_image
 from mskgrasp.palletize.height_maps import read_height_maps, write_height_maps
 from mskgrasp.palletize.pallet_slots import Slot
@@ -75,6 +78,45 @@ def test_without_feeder_and_tracker_an_operator_places_parts_and_tape_measures(t
     assert placed.translation_error is not None
     assert np.hypot(*(true.position[:2] - [0.52, 0.05])) == pytest.approx(placed.translation_error, abs=4e-3)
     assert unknown.placed and unknown.translation_error is None and "--tape" in unknown.unmeasured
+
+
+def test_a_part_that_was_released_is_not_placed_again_and_one_that_is_not_seen_is_reported(
+    tmp_path, monkeypatch
+):
+    """The hand that should rise cannot: out of reach, or stopped by a contact."""
+    calls: list[Exception] = []
+
+    def stopped(error: Exception):
+        def place(cell, pose, recover, *, arrived, **settings):
+            calls.append(error)
+            arrived()
+            raise error
+
+        return place
+
+    cell = sapien_cell(SapienCellConfig(type="sapien", part=PART))
+    task = PlacementTask(
+        part=PART, number=0, index=2, slot=Slot(x=0.5, y=0.06, theta=0.0), correction="none", seed=5,
+        keep=False,
+    )  # fmt: skip
+    (tmp_path / "placements").mkdir()
+    with cell.connected():
+        planner = make_planner(PRETRAINED, PlannerConfig(n_candidates=100), cell)
+        engine = TrialEngine(cell, Operator(cell, yes=True), picture=tmp_path / "next.png")
+        worker = PickAndPlace(engine, planner, tmp_path)
+        monkeypatch.setattr(pick_and_place, "place", stopped(OutOfWorkspace("too high")))
+        with pytest.raises(OutOfWorkspace, match="too high"):
+            worker.run(task)
+        assert len(calls) == 1
+        monkeypatch.setattr(pick_and_place, "place", stopped(MotionAborted("contact")))
+        assert worker.run(task).reason == "collided" and len(calls) == 2
+        assert 0.01 < worker._tops[2] < 0.03  # the nut stands there
+
+        def unseen(frame, **settings):
+            raise NoPartFound("nothing rises")
+
+        monkeypatch.setattr(pick_and_place, "seen_footprint", unseen)
+        assert worker.run(task).reason == "no part found" and len(calls) == 2
 
 
 @pytest.mark.slow
