@@ -66,15 +66,16 @@ class Row:
         n, of = self.certified.n, self.certified.of
         if self.planner == "networks":
             return "the networks"
-        if of and self.networks == of:
-            return "the networks (no certified grasp)"
         counts = {"certified grasps": n, "uncertified ones": self.uncertified}
         used = {name: count for name, count in counts.items() if count}
         if of in used.values():
             return next(iter(used)) + ("" if n else " (no certified grasp)")
         planned = " and ".join(f"{name} in {count}" for name, count in used.items())
+        if not used and not self.networks:
+            return "nothing: no grasp was planned"
         if not used:
-            return f"the networks in {self.networks} of {of} attempts"
+            some = "" if self.networks == of else f" in {self.networks} of {of} attempts"
+            return f"the networks{some} (no certified grasp)"
         return f"{planned} of {of} attempts" + (", else the networks" if self.networks else "")
 
     @property

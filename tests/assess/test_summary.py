@@ -72,6 +72,10 @@ def test_grasps_that_the_networks_planned_are_not_called_certified():
     nothing = [made(number, planned_by=None, lifted=False, placed=None) for number in range(5)]
     said = verdict(rows([*(made(number) for number in range(15)), *nothing]), EXACT, TOLERANCE)
     assert " by certified grasps in 15 of 20 attempts, corrected by" in said
+    unknown = [made(number, planned_by="networks") for number in range(18)]
+    said = verdict(rows(unknown + nothing[:2]), EXACT, TOLERANCE)
+    assert " by the networks in 18 of 20 attempts (no certified grasp)" in said
+    assert [row.planned_by for row in rows(nothing)] == ["nothing: no grasp was planned"]
     all_of_them = [made(number) for number in range(20)]
     assert verdict(rows(all_of_them), EXACT, TOLERANCE).endswith(" by certified grasps")
 
