@@ -68,7 +68,7 @@ class CertifyConfig(Config):
     """Least share of its last simulations that a certified grasp lifts."""
     most_error: float = Field(default=0.002, gt=0)
     """Greatest expected distance (RMS) by which a certified grasp's part misses its predicted place, m."""
-    clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.05)
+    clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.06)
     """Least distance of the pads from the table, m."""
     pose_errors: PoseErrors = PoseErrors()
     """Errors of the part's pose as the camera gives it."""
