@@ -10,7 +10,7 @@ import numpy as np
 from hal.arm import JOINT_TOLERANCE
 from hal.camera import RgbdFrame
 from hal.cell import Cell
-from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, Stopped
+from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, OutOfWorkspace, Stopped
 from hal.hand import Load
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import HOLD_S, PAD_REACH, SAME_HAND, Grasp
@@ -253,8 +253,13 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
     here, limits = state.T_base_tcp, arm.limits
     inside = (limits.box_lower <= here.position) & (here.position <= limits.box_upper)
     if inside[:2].all():  # an arm that was guided by hand out of the box may not rise there
-        above = max(clear_height(cell, tallest), here.position[2] + RETREAT)
-        arm.move_to_pose(_moved_to_height(here, min(above, float(limits.box_upper[2]))), speed=0.25)
+        clear = clear_height(cell, tallest)
+        above = min(max(clear, here.position[2] + RETREAT), float(limits.box_upper[2]))
+        try:
+            arm.move_to_pose(_moved_to_height(here, above), speed=0.25)
+        except OutOfWorkspace:  # a joint is near its limit
+            if here.position[2] < clear:
+                raise
     arm.move_to_joints(cell.workspace.home)
 
 
@@ -267,6 +272,9 @@ def _put_down_below(cell: Cell, grasped: float) -> None:
         cell.arm.move_to_pose(_moved_to_height(here, height), speed=0.15)
     except Stopped:
         raise
+    except OutOfWorkspace:
+        if not cell.arm.simulated:  # only a simulated part may fall
+            raise
     except MotionAborted:
         cell.arm.recover()  # it stands on what it met
 

@@ -343,6 +343,47 @@ def test_on_its_way_home_the_hand_first_rises(cell: Cell, arm: WritingArm):
     assert arm.log == [("gripper", 0.08)]
 
 
+def test_a_hand_that_cannot_rise_goes_home_if_it_is_above_all_else(cell: Cell, arm: WritingArm, monkeypatch):
+    """A straight line up may not exist, by a joint that is near its limit."""
+
+    def refuse(T_base_tcp: Pose, *, speed: float = 0.25) -> None:
+        raise OutOfWorkspace("no straight line")
+
+    for z, tallest in ((0.2, 0.1), (0.2, 0.3), (0.06, 0.0)):
+        with monkeypatch.context() as refused:
+            arm.move_to_pose(Pose(position=np.array([0.5, 0.2, z]), quat_wxyz=GRASP.T_base_tcp.quat_wxyz))
+            arm.log.clear()
+            refused.setattr(arm, "move_to_pose", refuse)
+            if z > tallest > 0.0:
+                go_home(cell, tallest=tallest)
+                assert arm.log == [("gripper", 0.08), ("joints", cell.workspace.home.tolist())]
+            else:
+                with pytest.raises(OutOfWorkspace, match="no straight line"):
+                    go_home(cell, tallest=tallest)
+                assert arm.log == [("gripper", 0.08)]
+
+
+def test_a_simulated_part_falls_where_the_hand_cannot_put_it_down_and_a_real_one_stays(
+    cell: Cell, arm: WritingArm, monkeypatch
+):
+    move = arm.move_to_pose
+
+    def no_way_down(T_base_tcp: Pose, *, speed: float = 0.25) -> None:
+        if T_base_tcp.position[2] < 0.1:
+            raise OutOfWorkspace("no straight line")
+        move(T_base_tcp, speed=speed)
+
+    execute_grasp(cell, GRASP)
+    monkeypatch.setattr(arm, "move_to_pose", no_way_down)
+    arm.log.clear()
+    with pytest.raises(OutOfWorkspace, match="no straight line"):
+        go_home(cell, take=lambda: False)
+    assert arm.log == [] and arm.in_hand() is not None
+    arm.simulated = True
+    go_home(cell)
+    assert arm.log[0] == ("gripper", 0.08) and arm.log[-1] == ("joints", cell.workspace.home.tolist())
+
+
 def test_an_arm_that_was_guided_out_of_the_box_goes_home_without_rising_there(cell: Cell, arm: WritingArm):
     home = cell.workspace.home.tolist()
     arm._joints = np.array([0.4, 1.2, 0.3, 0, 0, 0, 0])  # y is 1 m at most
