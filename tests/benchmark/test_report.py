@@ -48,7 +48,7 @@ def test_the_first_line_names_the_planner_that_places_most(written):
     out, headline, _ = written
     assert headline.startswith(
         "Of all 10 attempts at 2 parts, ours places most within 1 mm and 2 degrees: 100% corrected by its "
-        "prediction (95 % interval 72% to 100%), 0% without a correction"
+        "prediction (95 % interval 46% to 100%), 0% without a correction"
     )
     assert json.loads((out / "report.json").read_text())["headline"] == headline
 
