@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hal.arm import JOINT_TOLERANCE
+from hal.arm import JOINT_TOLERANCE, POSITION_TOLERANCE
 from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, OutOfWorkspace, Stopped
@@ -258,7 +258,7 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
         try:
             arm.move_to_pose(_moved_to_height(here, above), speed=0.25)
         except OutOfWorkspace:  # a joint is near its limit
-            if here.position[2] < clear:
+            if here.position[2] < clear - POSITION_TOLERANCE:
                 raise
     arm.move_to_joints(cell.workspace.home)
 
