@@ -217,7 +217,8 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
 
     What the hand holds is not dropped: a person takes it, or the hand puts it down straight below, as high as
     it was grasped. What it has held since an earlier program, a person must take. An arm that was guided by
-    hand to beside the box moves home without the retreat.
+    hand to beside the box moves home without the retreat, and so does one that cannot rise and is above all
+    else. Where no way leads straight down, a simulated part falls.
 
     Args:
         cell: Connected.
@@ -227,7 +228,8 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
 
     Raises:
         HandFull: The hand holds something that nobody took; nothing moved.
-        OutOfWorkspace: The way up, or home, is refused; the fingers are open.
+        OutOfWorkspace: The way up, or home, is refused, and the fingers are open; or the way down is, and a
+            real hand still holds the part.
         MotionAborted: The hand touched something.
     """
     arm = cell.arm

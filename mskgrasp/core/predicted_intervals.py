@@ -31,8 +31,8 @@ def normal_half_width(level: float, variance: np.ndarray | None = None) -> float
 class IntervalTable(Config):
     """Half widths of central intervals, which depend on the predicted deviation.
 
-    Errors are not normal: most parts do not rise in the hand, some do by 10 mm. The surer a prediction, the
-    less it errs for its deviation.
+    Errors are not normal: most parts do not rise in the hand, some do by 10 mm. The smaller the predicted
+    deviation, the less a prediction errs in relation to it.
     """
 
     deviations: tuple[_Row, ...] = Field(min_length=1)

@@ -50,7 +50,7 @@ def test_measured_half_widths_hold_as_much_of_other_errors_with_heavy_tails():
 
 
 def test_intervals_hold_their_share_of_sure_and_of_unsure_predictions():
-    """The surer a prediction, the less it errs for its deviation, as where a planner chose the grasp."""
+    """Small deviations are too large, as where a planner chose the grasp."""
     rng = np.random.default_rng(0)
     std = np.exp(rng.normal(size=(40_000, 4)))
     errors = rng.normal(size=std.shape) * std * np.where(std < 1, std, 1)
