@@ -150,7 +150,7 @@ def _talk(call: Callable[..., Any], *message: Any) -> Any:
     """
     try:
         return call(*message)
-    except (EOFError, BrokenPipeError) as error:
+    except (EOFError, ConnectionError) as error:  # reset: it has ended without reading the last result
         raise _ParentGone from error
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -96,6 +99,30 @@ def test_a_pipe_or_file_of_the_job_that_ends_is_no_lost_parent(tmp_path: Path, j
     executor = LocalExecutor(breaking, tmp_path, 1)
     with closing(executor), pytest.raises(WorkerFailed, match=cause):
         list(run_jobs([job], executor))
+
+
+@contextmanager
+def doubling(_: None) -> Iterator[Callable[[int], Iterator[int]]]:
+    """Doubles numbers."""
+
+    def work(job: int) -> Iterator[int]:
+        yield 2 * job
+
+    yield work
+
+
+def test_workers_of_a_killed_program_end_silently():
+    program = (
+        "import os, signal, time\n"
+        "from tests.runtime.test_local_executor import doubling\n"
+        "from mskgrasp.runtime.local_executor import LocalExecutor\n"
+        "executor = LocalExecutor(doubling, None, 1)\n"
+        "executor.submit(0, 1)\n"
+        "assert executor._workers[0].connection.poll(60)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True, timeout=120)
+    assert done.returncode == -signal.SIGKILL and not done.stderr
 
 
 def test_closing_the_iterator_ends_the_workers():
