@@ -3,7 +3,8 @@
 Trains every network with every seed, from nothing, and scores all on held-out grasps of known parts and on
 novel parts. Every training is stored in --out as soon as it is finished; started again, the command goes on,
 and started twice it trains two networks at a time. All stop after the same number of epochs without a lower
-validation loss, and keep the epoch of the lowest. The four networks of the paper share one quality network.
+validation loss, and keep the epoch of the lowest. The four networks of the paper share one quality network
+for each recipe.
 """
 
 from __future__ import annotations

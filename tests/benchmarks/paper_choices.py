@@ -30,7 +30,10 @@ def paper_choices(
     paper_seeds: int | None = None,
     displacement_only: bool = False,
 ) -> list[Choice]:
-    """The paper's four networks by its own recipe, its best one by our recipe, and ours.
+    """The paper's four networks by its own recipe and by ours, and ours.
+
+    By a recipe the four share one quality network. Half turns and mirror images are part of our recipe where
+    patches are rotated with the grasp.
 
     Args:
         patience: Epochs without a lower validation loss after which any of them stops.
@@ -46,7 +49,7 @@ def paper_choices(
     paper, ours = (with_stages(config.model_copy(update=same), patience=patience) for config in (paper, ours))
     paper = paper.model_copy(update={"mixed_precision": mixed_precision})
     assert isinstance(paper.network, PatchNetworkConfig)
-    found = []
+    by_its_own, by_ours = [], []
     for name, image, variance in (
         (PAPER, "grasp", True), ("GCIP-M", "grasp", False),
         ("OCFI-M+V", "object", True), ("OCFI-M", "object", False),
@@ -54,11 +57,16 @@ def paper_choices(
         network = paper.network.model_copy(update={"image": image, "variance": variance})
         config = paper.model_copy(update={"network": network})
         quality_of = PAPER_AS_OURS if displacement_only else "" if name == PAPER else PAPER
-        found.append(Choice(name=name, config=config, quality_of=quality_of, most_seeds=paper_seeds))
-    views = paper.network.model_copy(update={"symmetric_views": ours.network.symmetric_views})
-    trained_as_ours = ours.model_copy(update={"network": views, "mixed_precision": mixed_precision})
-    recipe, own = Choice(name=PAPER_AS_OURS, config=trained_as_ours), Choice(name=OURS, config=ours)
-    return [recipe, *found, own] if displacement_only else [*found, recipe, own]
+        by_its_own.append(Choice(name=name, config=config, quality_of=quality_of, most_seeds=paper_seeds))
+        symmetric = ours.symmetric and image == "grasp"
+        views = network.model_copy(update={"symmetric_views": ours.network.symmetric_views and symmetric})
+        config = ours.model_copy(
+            update={"network": views, "symmetric": symmetric, "mixed_precision": mixed_precision}
+        )
+        quality_of = "" if name == PAPER else PAPER_AS_OURS
+        by_ours.append(Choice(name=f"{name}, our recipe", config=config, quality_of=quality_of))
+    own = Choice(name=OURS, config=ours)
+    return [*by_ours, *by_its_own, own] if displacement_only else [*by_its_own, *by_ours, own]
 
 
 def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
