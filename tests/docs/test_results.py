@@ -79,7 +79,13 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
     index.write_text("# Results\n\n| page | measured |\n|---|---|\n| [Speed](speed.md) | speed |\n\nMore.\n")
     runs = {name: run["page"] for name, run in known_runs().items() if "page" in run}
     runs = {name: page for name, page in runs.items() if page["file"] == "models.md"}
-    assert list(runs) == ["model_baselines", "equal_recipes", "displacement_same_data", "oracles"]
+    assert list(runs) == [
+        "model_baselines",
+        "equal_recipes",
+        "paper_networks",
+        "displacement_same_data",
+        "oracles",
+    ]
     for name in (*runs, "oracles"):
         add_to_page(name, runs[name], tmp_path)
     text = (tmp_path / "models.md").read_text()
@@ -87,6 +93,8 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
         "run: model_baselines",
         "end",
         "run: equal_recipes",
+        "end",
+        "run: paper_networks",
         "end",
         "run: displacement_same_data",
         "end",
