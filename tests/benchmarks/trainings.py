@@ -138,7 +138,7 @@ def _steps(choice: Choice, samples: Samples, sides: Sides) -> int:
     """Steps of all epochs of a training."""
     n_success = int(samples.success[sides.training].sum())
     balanced = 2 * min(n_success, len(sides.training) - n_success)
-    n_samples = {"gqn": balanced, "transfer": balanced, "gdn": n_success}
+    n_samples = {"gqn": balanced, "gdn": n_success}
     settings = {name: getattr(choice.config, name) for name in choice.stages()}
     return sum(one.epochs * math.ceil(n_samples[name] / one.batch_size) for name, one in settings.items())
 
