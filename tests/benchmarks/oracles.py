@@ -277,8 +277,8 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.benchmarks.oracles",
-        description="Train our displacement network, without its residual blocks, with what a camera does not "
-        "see, and compare.",
+        description="Train our displacement network, without its residual blocks, with what a camera does "
+        "not see, and compare.",
     )
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--out", type=Path, required=True, help="folder of images, trainings and reports")
