@@ -122,7 +122,8 @@ class SimulatedWorld(ABC):
 
         Args:
             part: Name or folder.
-            seed: Determines its position and turn, the same ones in every simulator.
+            seed: Determines its position and turn, in all simulators from the same distribution. They are
+                the same ones where all resting poses of the part stand in the engine.
             keep: Parts outside the region, such as on a pallet, stay; else the table is cleared.
 
         Raises:

@@ -30,7 +30,7 @@ from tasks.attempt.attempt import Attempt
 from tasks.robot.contacts import HandContacts
 from tasks.robot.motion import PandaMotion
 from tasks.robot.panda import GraspPanda, panda_for
-from tasks.scene.camera import camera_config, without_reflection_table
+from tasks.scene.camera import FAR, camera_config, without_reflection_table
 from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
 from tasks.scene.part_actor import add_part
 from tasks.scene.physics import MOST_HULLS, sim_config
@@ -119,9 +119,9 @@ class GraspDisplacementEnv(BaseEnv):
         self.T_base_camera = self.overhead.T_base_camera(self.region_centre)
         self._part_names = list(parts) if parts else None
         self._n_scenes = num_envs
-        # Parts may be assigned later: every sub-scene has room for the most complex one.
-        names = self._part_names or []
-        self._most_hulls = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
+        # Other parts may be assigned later, and ManiSkill sizes PhysX's buffers once: every sub-scene has
+        # room for the most complex part of the catalogue.
+        self._most_hulls = max([MOST_HULLS, *(find_part(name).n_hulls for name in self._part_names or [])])
         self.parts: list[Part] = []
         self._standing: dict[str, StandingPoses] = {}
         self._outcome: dict[str, Tensor] | None = None
@@ -175,6 +175,12 @@ class GraspDisplacementEnv(BaseEnv):
         if names is None:
             names = [str(name) for name in self._batched_episode_rng.choice(list(starter_names()))]
         self.parts = [find_part(names[i % len(names)]) for i in range(self.num_envs)]
+        for part in self.parts:
+            if self.gpu_sim_enabled and part.n_hulls > self._most_hulls:
+                raise BadConfig(
+                    f"{part.name} has {part.n_hulls} hulls, this environment's memory is for "
+                    f"{self._most_hulls}: name the part when the environment is made"
+                )
         self._build_table()
         actors = []
         for i, part in enumerate(self.parts):
@@ -279,6 +285,7 @@ class GraspDisplacementEnv(BaseEnv):
     def set_state_dict(self, state: dict, env_idx: Tensor | None = None) -> None:
         """Set the state of `get_state_dict`, which does not include the last step's contacts."""
         super().set_state_dict(state, env_idx)
+        self._outcome = None  # of the attempt before, which the state need not come from
         if self._friction is not None:
             self._friction.reset()
 
@@ -307,11 +314,14 @@ class GraspDisplacementEnv(BaseEnv):
     # ------------------------------------------------------------------ images and poses
 
     def capture_depth(self) -> Tensor:
-        """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture."""
+        """(n, h, w) float32 depth in metres from the overhead camera, the robot left out of the picture.
+
+        NaN where the camera sees nothing, such as beyond the table.
+        """
         return self._render_overhead("depth", with_robot=False)["depth"][..., 0]
 
     def capture_rgbd(self, *, with_robot: bool = False) -> tuple[Tensor, Tensor]:
-        """Colour (n, h, w, 3) uint8 and depth (n, h, w) float32 metres from the overhead camera."""
+        """Colour (n, h, w, 3) uint8 and depth (n, h, w), as of `capture_depth`, from the overhead camera."""
         images = self._render_overhead("rgb", "depth", with_robot=with_robot)
         return images["rgb"], images["depth"][..., 0]
 
@@ -321,9 +331,11 @@ class GraspDisplacementEnv(BaseEnv):
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
             sensor = self._overhead_sensor
             sensor.capture()
-            return sensor.get_obs(
+            images = sensor.get_obs(
                 rgb="rgb" in textures, depth="depth" in textures, position=False, segmentation=False
             )
+            depth = images["depth"]
+            return images | {"depth": depth.where(depth < 0.99 * FAR, torch.nan)}
         finally:
             self.agent.show(True)
 

@@ -11,11 +11,12 @@ import torch
 from torch import Tensor
 
 from hal.arm_state import ArmState, GraspOutcome
-from hal.limits import ArmLimits
+from hal.gripper import FRANKA_HAND
+from hal.limits import ArmLimits, lowest_point
 from hal.sim.world import SapienWorld
 from hal.simulated import SimulatedArm, contact_fault, joint_motion_s
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import MAX_OPENING, PAD_REACH
+from mskgrasp.core.grasp import MAX_OPENING
 from mskgrasp.core.minimum_jerk import minimum_jerk_steps
 from mskgrasp.core.panda_kinematics import forward, forward_pose, track
 from tasks.robot.reflex import Reflex
@@ -127,7 +128,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         if self._force > 0:
             return np.zeros(len(path), dtype=bool)
         world, hands = self._world, forward(path)[0].numpy()
-        lowest = hands[:, 2, 3] - PAD_REACH
+        lowest = (hands[:, 2, :3] @ FRANKA_HAND.corners.T).min(axis=1) + hands[:, 2, 3]
         clear = lowest > world.top() + AIR_GAP
         if not clear.all() and is_vertical(hands):
             reach = world.reach(Pose.from_matrix(hands[lowest.argmin()]))
@@ -187,7 +188,7 @@ class SapienArm(SimulatedArm[SapienWorld]):
         # at once instead of after the ramp to its surface.
         motion.set_fingers(motion.finger_target.clip(motion.fingers().min() - lag))
         goal, hand = width / 2, self._state().T_base_tcp
-        clear = bool(hand.position[2] - PAD_REACH > world.top() + AIR_GAP)
+        clear = lowest_point(hand) > world.top() + AIR_GAP
         reach = world.reach(hand)
         if not clear and reach is not None and reach + PAD_GAP <= goal:
             if float(motion.fingers().min()) < reach + PAD_GAP:

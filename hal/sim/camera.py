@@ -6,7 +6,6 @@ import numpy as np
 
 from hal.sim.world import SapienWorld
 from hal.simulated import SimulatedCamera
-from tasks.scene.camera import FAR
 
 
 class SapienCamera(SimulatedCamera[SapienWorld]):
@@ -17,6 +16,4 @@ class SapienCamera(SimulatedCamera[SapienWorld]):
 
     def _render(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         colour, depth = self._world.env.capture_rgbd(with_robot=True)
-        metres = depth[0].cpu().numpy().astype(np.float32)
-        metres[metres >= 0.99 * FAR] = np.nan
-        return colour[0].cpu().numpy(), metres, self._world.fine_colour()
+        return colour[0].cpu().numpy(), depth[0].cpu().numpy(), self._world.fine_colour()

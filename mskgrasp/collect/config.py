@@ -18,7 +18,7 @@ SUCCESS_IS_OF_RANDOM = (
 
 
 class PartFilter(Config):
-    """Bounds on the parts to collect and to learn from; null switches a bound off."""
+    """Bounds on the parts to collect; null switches a bound off."""
 
     min_length: float | None = None
     """Least length of a part's longest axis, m; shorter parts are not collected."""
@@ -51,7 +51,7 @@ class PartFilter(Config):
         return _between(longest_axis, self.min_length, self.max_length)
 
     def takes_success(self, rate: float) -> bool:
-        """Whether a part of which random grasps lift this share is worth collecting and learning from."""
+        """Whether a part of which random grasps lift this share is worth collecting further."""
         return _between(rate, self.min_success, self.max_success)
 
 

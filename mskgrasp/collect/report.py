@@ -29,7 +29,8 @@ _HEADER = (
 _EXPLAINED = (
     "Success: share of the attempts that lifted the part. Median displacement and turn: of the part in the "
     "hand, over the attempts that lifted it. Discarded attempts are not counted; an unsettled one was drawn "
-    "again. The part filter compares the success with part_filter.min_success and max_success."
+    "again. The part filter compares the success in a part's first shard with part_filter.min_success and "
+    "max_success."
 )
 
 Columns = dict[str, np.ndarray]
@@ -50,7 +51,7 @@ class PartSummary:
         median_tilt: Median tilt over successes, radians; None without any.
         failures: Number of failures by reason.
         discarded: Number of discarded attempts by reason; not among the attempts.
-        kept: Whether the part passes the filter on its success rate.
+        kept: Whether the part passes the filter on the success rate of its first shard.
     """
 
     part: str
@@ -84,6 +85,7 @@ def _summarise_part(
         for name in ("success", "failure", "displacement", "tilt")
     )
     displacement, tilt = displacement[success], tilt[success]
+    first = next((columns["success"] for columns, info in shards if info.index == 0), success)
     discarded: Counter[str] = Counter()
     for _, info in shards:
         discarded.update(info.discarded)
@@ -98,7 +100,7 @@ def _summarise_part(
         median_tilt=_median(tilt),
         failures={FAILURES[code]: int(n) for code, n in enumerate(np.bincount(failure)) if code and n},
         discarded=dict(discarded),
-        kept=part_filter.takes_success(success_rate(success)),
+        kept=part_filter.takes_success(success_rate(first)),
     )
 
 

@@ -160,9 +160,8 @@ def bootstrap_interval(
         statistic(np.concatenate([values[i] for i in rng.integers(len(values), size=len(values))]))
         for _ in range(repeats)
     ]
-    tail, n = (1 - level) / 2, len(values)
-    if n > 1:
-        tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, tail)))
+    n = len(values)
+    tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 - level) / 2)))
     if np.isnan(found).all():
         return float("nan"), float("nan")
     low, high = np.nanquantile(found, [tail, 1 - tail])
@@ -182,7 +181,8 @@ def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[flo
         level: Confidence level.
 
     Returns:
-        The interval; None of fewer than three clusters: two, with one degree of freedom, bound nothing.
+        The interval; None of fewer than three clusters, and where a single one has all errors: they bound
+        nothing.
     """
     k = len(errors)
     if k < 3:
@@ -190,9 +190,12 @@ def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[flo
     squares = np.array([float((np.asarray(one, dtype=np.float64) ** 2).sum()) for one in errors])
     counts = np.array([len(one) for one in errors], dtype=np.float64)
     total = float(squares.sum() / counts.sum())
-    left_out = (squares.sum() - squares) / (counts.sum() - counts)
-    if total == 0.0 or not (left_out > 0).all():
-        return 0.0, float(np.sqrt(left_out.max(initial=total)))
+    if total == 0.0:
+        return 0.0, 0.0
+    # Summed, not subtracted from the sum: beside a far greater one small errors would be rounded away.
+    left_out = (1 - np.eye(k)) @ squares / (counts.sum() - counts)
+    if not (left_out > 0).all():
+        return None
     logs = np.log(left_out) / 2
     deviation = float(np.sqrt((k - 1) / k * ((logs - logs.mean()) ** 2).sum()))
     factor = float(np.exp(stdtrit(k - 1, (1 + level) / 2) * deviation))

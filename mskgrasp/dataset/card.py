@@ -14,7 +14,7 @@ from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import share_interval
 from mskgrasp.dataset.label_error import read_label_error
-from mskgrasp.dataset.shards import SCHEMA_VERSION, list_shards, read_columns
+from mskgrasp.dataset.shards import list_shards, read_columns
 
 CardTable = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, headers, rows."""
@@ -174,7 +174,6 @@ def tables(card: Card) -> list[CardTable]:
         ("error of a label", read_label_error(simulations)),
         ("depth images", f"{card.image[1]} x {card.image[0]} pixels, uint16, 0.1 mm"),
         ("seed", f"{card.seed}"),
-        ("schema", f"version {SCHEMA_VERSION}"),
         ("on disk", f"{card.shards} shards, {_bytes(card.size)}, {_bytes(card.size / max(n, 1))} an attempt"),
     ]
     by_family = [

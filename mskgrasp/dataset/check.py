@@ -18,6 +18,7 @@ from mskgrasp.dataset.attempts import ShardInfo, problems, shape_problems
 from mskgrasp.dataset.ranges import range_problems
 from mskgrasp.dataset.shards import read_unchecked, shard_path, success_rate
 from mskgrasp.parts import store
+from mskgrasp.parts.builtin import is_known
 
 _MOST_MISSING = 100
 """Missing shards of a part that are named one by one."""
@@ -240,6 +241,8 @@ def _hash_faults(shards: list[_Shard], notes: list[str]) -> Iterator[Fault]:
 
 def _in_parts_folder(part: str, key: str) -> str | None:
     """Read a value of the local part of that name; None if there is no such part."""
+    if not store.LEGAL_FOLDER.fullmatch(part):
+        return None
     try:
         return str(store.read_record(store.parts_folder() / part).get(key))
     except BadPart:
@@ -272,7 +275,7 @@ def _missing(
                 yield Fault(path=shard.path, reason=reason)
     words = settings.get("parts")
     # A part may also be given by its folder, whose own name need not be the part's.
-    asked = [str(word) for word in words if "/" not in str(word)] if isinstance(words, (list, tuple)) else []
+    asked = [str(word) for word in words if is_known(str(word))] if isinstance(words, (list, tuple)) else []
     for part in sorted({*highest, *asked}):
         n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
         n = 1 if part in one_is_enough else n

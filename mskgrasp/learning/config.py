@@ -70,10 +70,6 @@ class LearningConfig(Config):
     keep_best: bool = True
     """Keep the epoch of lowest validation loss instead of the last."""
     gqn: StageConfig = StageConfig()
-    transfer: StageConfig | None = None
-    """A network with the displacement network's layers first learns which attempts lift the part, and its
-    features start the displacement network, which sees the successes alone. null: the convolutions of the
-    quality network do, where both have the same (paper, figure 3)."""
     gdn: StageConfig = StageConfig()
 
     @model_validator(mode="after")
@@ -81,10 +77,6 @@ class LearningConfig(Config):
         if self.symmetric and self.network.sees_object:
             raise ValueError(
                 "symmetric: true needs patches that are rotated with the grasp; with image: object none are"
-            )
-        if self.transfer is not None and self.network.sees_object:
-            raise ValueError(
-                "transfer needs patches that are rotated with the grasp; with image: object none are"
             )
         if self.network.mixture > 1 and self.beta > 0:
             raise ValueError(

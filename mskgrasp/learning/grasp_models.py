@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -104,6 +104,10 @@ class Models:
     def device(self) -> torch.device:
         """Device of the weights."""
         return next(self.gqn.parameters()).device
+
+    def uncalibrated(self) -> Models:
+        """The same networks, without corrections of what they predict."""
+        return replace(self, meta=self.meta.model_copy(update={"calibration": ModelCalibration()}))
 
     @torch.inference_mode()
     def quality(self, patches: Tensor, centre_grasp: Tensor, height: Tensor) -> Tensor:

@@ -101,8 +101,10 @@ def calibrate(models: Models, samples: Samples, rows: torch.Tensor) -> ModelCali
 
     The quality's log odds are stretched and shifted (Platt 1999); each variance is scaled by
     (q / 1.645)^2, q the 90 % quantile of |error| / deviation, so that heavy tails do not widen the whole
-    distribution; intervals of any probability get the widths that hold as much, by the deviation.
+    distribution; intervals of any probability get the widths that hold as much, by the deviation. What the
+    models were calibrated by before does not count.
     """
+    models = models.uncalibrated()
     quality = predict_quality(models, samples, rows)
     slope, offset = _platt(logit(np.clip(quality, 1e-9, 1 - 1e-9)), samples.success[rows].numpy())
     scale, intervals = (), None

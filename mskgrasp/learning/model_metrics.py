@@ -13,7 +13,7 @@ class EpochMetrics:
     """Losses and validation metrics of one epoch of one network.
 
     Attributes:
-        stage: The network: ``gqn``, ``transfer`` or ``gdn``.
+        stage: The network: ``gqn`` or ``gdn``.
         epoch: Number of the epoch, from 1.
         train_loss: Mean loss of the training batches.
         validation_loss: Loss on the validation parts; of ``gdn`` that of one Gaussian with the prediction's

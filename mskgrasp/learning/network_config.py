@@ -93,11 +93,6 @@ class PatchNetworkConfig(_NetworkConfig):
         return self.image == "object"
 
     @property
-    def of_displacement(self) -> PatchNetworkConfig:
-        """The architecture whose quality network has the layers and the input of the displacement network."""
-        return self
-
-    @property
     def patch_shape(self) -> tuple[int, int]:
         """Rows and columns of a patch."""
         return self.patch_pixels, self.patch_pixels
@@ -159,18 +154,6 @@ class HandNetworkConfig(_NetworkConfig):
                 "quality_columns must leave the same number of the patch's columns on either side"
             )
         return self
-
-    @property
-    def of_displacement(self) -> HandNetworkConfig:
-        """The architecture whose quality network has the layers and the input of the displacement network."""
-        return self.model_copy(
-            update={
-                "quality_stride": 1,
-                "quality_columns": None,
-                "layers": self.displacement_layers,
-                "blocks": self.displacement_blocks,
-            }
-        )
 
     @property
     def patch_shape(self) -> tuple[int, int]:

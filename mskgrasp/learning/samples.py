@@ -116,13 +116,17 @@ class Samples:
         target = self.grasp_displacement[rows]
         return torch.cat([target, self.swing[rows]], dim=1) if network.swing else target
 
+    def random_of(self, rows: Tensor) -> Tensor:
+        """Those of some rows whose grasps are random, not a planner's."""
+        return rows[~self.planned[rows]]
+
     def of_parts_between(self, low: float, high: float) -> Samples:
         """Select the parts whose success rate lies in [low, high].
 
         Raises:
             BadDataset: No part has such a rate.
         """
-        rates = [float(self.success[self.part == i].float().mean()) for i in range(len(self.parts))]
+        rates = [float(self.success[self.part == i].double().mean()) for i in range(len(self.parts))]
         kept = [i for i, rate in enumerate(rates) if low <= rate <= high]
         if not kept:
             found = ", ".join(f"{rate:.0%}" for rate in sorted(rates) if not math.isnan(rate))

@@ -47,7 +47,7 @@ class Reporter:
 
 
 class Stage:
-    """Training of one network: ``gqn``, ``transfer`` or ``gdn``, of which the first two learn the quality."""
+    """Training of one network: ``gqn`` or ``gdn``."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class Stage:
         self.training_rows, self.rows = sides.training, sides.validation
         self.seen = samples.on(models.device) if seen is None else seen
         self.noise = torch.Generator(models.device)
-        self.of_quality = name != "gdn"
+        self.of_quality = name == "gqn"
         network = models.gqn if self.of_quality else models.gdn
         network.features.mixed_precision = config.mixed_precision
         self.network: GraspQualityNetwork | GraspDisplacementNetwork = network
@@ -87,7 +87,9 @@ class Stage:
         if self.settings.batch_norm:
             if self.n_samples < 2:
                 raise BadDataset("batch_norm: true needs two successes at the training parts; collect more")
-            add_batch_norms(network.features)
+            with torch.random.fork_rng(devices=[]):
+                torch.manual_seed(zlib.crc32(f"{config.seed} {name}".encode()))
+                add_batch_norms(network.features)
         on_a_gpu = models.device.type == "cuda"
         parameters, rate = list(self.network.parameters()), self.settings.learning_rate
         if on_a_gpu:  # what a graph reads has to lie there
@@ -248,6 +250,8 @@ class Stage:
         )
 
     def _validate(self) -> dict[str, float]:
+        """The loss of all held-out rows, and metrics of random grasps, as in ``metrics.json``."""
+        random = ~self.samples.planned[self.rows]
         if self.of_quality:
             success = self.samples.success[self.rows].double()
             quality = torch.from_numpy(held_out.predict_quality(self.models, self.samples, self.rows))
@@ -257,15 +261,17 @@ class Stage:
             balanced = (each[success > 0].mean() + each[success == 0].mean()) / 2
             return {
                 "validation_loss": float(balanced),
-                "auroc": metrics.auroc(quality.numpy(), success.numpy() > 0),
+                "auroc": metrics.auroc(quality[random].numpy(), success[random].numpy() > 0),
             }
-        rows = self.rows[self.samples.success[self.rows]]
+        held = self.samples.success[self.rows]
+        rows, random = self.rows[held], random[held]
         mean, variance = held_out.predict_grasp_displacement(self.models, self.samples, rows)
         predicted = torch.from_numpy(variance) if self.config.network.variance else None
         std = self.models.gdn.target_std.cpu().double()
         target = self.samples.targets(rows, self.config.network).double()
         loss = displacement_loss(torch.from_numpy(mean), predicted, target, std)
-        errors = held_out.prediction_errors(self.samples, rows, mean, variance)
+        mean, variance = mean[random.numpy()], variance[random.numpy()]
+        errors = held_out.prediction_errors(self.samples, rows[random], mean, variance)
         return {
             "validation_loss": float(loss),
             "translation_rmse": errors.translation_rmse,

@@ -75,22 +75,6 @@ def describe_networks(samples: Samples, training_rows: Tensor, config: LearningC
     )
 
 
-def stages_of(models: Models, config: LearningConfig) -> dict[str, Models]:
-    """Names of the networks that are trained, in order, with the models that each belongs to.
-
-    That of ``transfer`` is the quality network of models of their own, on the same device: a new one with the
-    layers and the input of the displacement network.
-    """
-    if config.transfer is None:
-        return {"gqn": models, "gdn": models}
-    meta = models.meta.model_copy(update={"network": models.meta.network.of_displacement})
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
-        gqn = GraspQualityNetwork(meta.network, meta.normalisation)
-    before = Models(gqn=gqn.to(models.device), gdn=models.gdn, meta=meta)
-    return {"gqn": models, "transfer": before, "gdn": models}
-
-
 def train(
     samples: Samples,
     config: LearningConfig,
@@ -117,8 +101,7 @@ def train(
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
-        UsageError: The checkpoint was made from other data, with another version or split of the samples, or
-            with a transfer that is not wanted.
+        UsageError: The checkpoint was made from other data, or with another version or split of the samples.
         TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()
@@ -129,23 +112,17 @@ def train(
         models = build_models(meta)
     models.gqn.to(device)
     models.gdn.to(device)
-    stages = stages_of(models, config)
-    networks: dict[str, nn.Module] = {
-        name: one.gdn if name == "gdn" else one.gqn for name, one in stages.items()
-    }
-    saved = _resumable(checkpoint_path, samples, sides, list(stages))
+    networks: dict[str, nn.Module] = {"gqn": models.gqn, "gdn": models.gdn}
+    saved = _resumable(checkpoint_path, samples, sides, list(networks))
     history: list[EpochMetrics] = list(saved.history) if saved else []
     seen = samples.on(models.device)  # once: a stage outlives its training until garbage is collected
-    for name in list(stages)[list(stages).index(saved.stage) if saved else 0 :]:
-        network = networks[name]
+    for name in list(networks)[list(networks).index(saved.stage) if saved else 0 :]:
         if quality is not None and name == "gqn":
-            network.load_state_dict(quality.state_dict())
+            models.gqn.load_state_dict(quality.state_dict())
             continue
-        if name == "gdn" and config.transfer is None:
+        if name == "gdn":
             models.gdn.start_from(models.gqn)
-        elif name == "gdn":
-            models.gdn.features.load_state_dict(stages["transfer"].gqn.features.state_dict())
-        stage = Stage(name, stages[name], samples, sides, config, seen=seen)
+        stage = Stage(name, models, samples, sides, config, seen=seen)
         best: dict[str, Tensor] = {}
         done = 0
         if saved is not None and saved.stage == name:
@@ -177,7 +154,7 @@ def _measured(models: Models, samples: Samples, sides: Sides, config: LearningCo
         found = held_out.calibrate(models, samples, sides.validation)
         models = replace(models, meta=models.meta.model_copy(update={"calibration": found}))
     # Of random grasps, so that models can be compared whether they learned from planned ones or not.
-    random = sides.validation[~samples.planned[sides.validation]]
+    random = samples.random_of(sides.validation)
     stored = held_out.measure_models(models, samples, sides.training, random).to_json()
     for side, rows in (("test", sides.test), ("new_sizes", sides.new_sizes)):
         if len(rows):

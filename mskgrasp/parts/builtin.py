@@ -107,7 +107,7 @@ def find_part(name_or_folder: str | Path) -> Part:
     if is_known(text):
         return store.read_part(store.parts_folder() / text)
     if Path(text).is_dir():
-        return store.read_part(Path(text))
+        return store.read_part(Path(text).absolute())  # a bare name of the folder could be another part's
     raise unknown_part(text)
 
 

@@ -22,7 +22,8 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
     """Names or folders of parts by names, folders and sets.
 
     ``train``, ``validation``, ``test`` and ``new_sizes``: the sets of the model, where its training names
-    them; otherwise those of the catalogue, all but the first without parts that the model was trained on.
+    them; otherwise those of the catalogue, all but the first without parts that the model was trained on,
+    and ``test`` and ``new_sizes`` without those that stopped its training and calibrated it.
     ``all``: every part of the starter set. Other words as in `mskgrasp.parts.chosen_names`. A set with a
     number, as in ``train:50``, is so many of its parts, chosen as by ``n_parts``. A file ``.txt`` is the
     names in it, one a line.
@@ -46,7 +47,8 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
             sets.append(list(known))
         elif word in SPLITS and word != "train":
             unseen = training.get(f"{word}_parts")
-            sets.append(unseen or [name for name in chosen_names((word,)) if name not in known])
+            seen = {*known, *(training.get("validation_parts") or () if word != "validation" else ())}
+            sets.append(unseen or [name for name in chosen_names((word,)) if name not in seen])
         elif word.endswith(".txt"):
             sets.append(chosen_names(_listed(Path(word))))
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import torch
 
 from mskgrasp.core.errors import BadDataset, NoPartFound, TableTooHigh
+from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
@@ -31,6 +33,8 @@ FIELDS = (
     "success", "failure", "displacement", "tilt", "width_after", "relative_speed",
     "pose_base_obj", "pose_tcp_obj_before", "pose_tcp_obj_after",
 )  # fmt: skip
+SAME_M, SAME_RAD = 5e-4, 5e-3
+"""A part this near to its stored pose is in that pose, which was measured once it was at rest."""
 MOST_REDRAWS = 4
 """Greatest number of times that an attempt whose part was not at rest is drawn again."""
 
@@ -141,8 +145,12 @@ class Simulator:
     def restore(self, task: ShardTask, labels: ShardLabels, dataset: Path) -> Iterator[int]:
         """Write a shard whose labels are known: its scenes are rendered, no grasp is tried; yield as `run`.
 
+        The labels hold for the scenes that they were made in. Where one comes out differently, because a
+        resting pose stands on one machine alone, the whole shard is simulated.
+
         Raises:
-            BadDataset: The labels are not those of this task.
+            BadDataset: The labels are not those of this task, or a planner chose the grasps of a scene that
+                comes out differently.
         """
         env = self.load(task.folder)
         columns, info = labels.columns, labels.info
@@ -156,6 +164,17 @@ class Simulator:
         images = np.zeros((len(numbers), self._camera.n_pixels, self._camera.n_pixels), np.uint16)
         for row, (attempt, draw) in enumerate(zip(numbers.tolist(), columns["draw"].tolist(), strict=True)):
             images[row] = capture_scene(env, task.part, task.seed, attempt, draw)[0]
+            if not lies_as(env, columns["pose_base_obj"][row]):
+                if info.planner:
+                    raise BadDataset(
+                        f"attempt {attempt} at part '{task.part}' lies otherwise here than in its labels, "
+                        "whose grasps a planner chose: leave the part out"
+                    )
+                shard = self.write(task, dataset)
+                for _ in itertools.islice(shard, row):  # as many as are yielded already
+                    pass
+                yield from shard
+                return
             yield int(columns["success"][row])
         for _ in range(task.n - len(numbers)):
             yield -1
@@ -238,6 +257,13 @@ def capture_scene(
     episode_seed, grasp_seed = scene_seeds(seed, part, attempt, draw)
     env.begin_episode(episode_seed)
     return depth_to_u16(env.capture_depth()[0].cpu().numpy()), grasp_seed
+
+
+def lies_as(env: GraspDisplacementEnv, pose_base_obj: np.ndarray) -> bool:
+    """Whether the part of an episode that has just begun lies as in a stored pose (7,)."""
+    drawn = Pose.from_vector(env.part_pose().as_vector()[0].cpu().numpy().astype(np.float64))
+    moved, turned = pose_distance(drawn, Pose.from_vector(np.asarray(pose_base_obj, np.float64)))
+    return moved <= SAME_M and turned <= SAME_RAD
 
 
 def discard_reason(outcome: dict[str, torch.Tensor], row: dict[str, np.ndarray]) -> str:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.shipped import config_file
-from mskgrasp.learning.config import DeviceName, LearningConfig, StageConfig
+from mskgrasp.learning.config import DeviceName, LearningConfig
 from mskgrasp.learning.network_config import NetworkConfig, PatchNetworkConfig
 
 DEFAULT_CONFIG = config_file("train/default.yaml")
@@ -19,9 +19,8 @@ DEFAULT_CONFIG = config_file("train/default.yaml")
 class TrainConfig(LearningConfig):
     """Settings of a training run."""
 
-    # The file chooses the architecture, and whether there is a transfer; options set the fields of either.
+    # The file chooses the architecture; options set its fields.
     network: Annotated[NetworkConfig, tyro.conf.AvoidSubcommands] = PatchNetworkConfig()
-    transfer: Annotated[StageConfig | None, tyro.conf.AvoidSubcommands] = None
     data: Path | None = None
     """The dataset folder."""
     planned: tuple[Path, ...] = ()
@@ -30,7 +29,7 @@ class TrainConfig(LearningConfig):
     out: Path | None = None
     """The model's folder. A run that was interrupted resumes when it is started again in the same way."""
     epochs: int | None = Field(default=None, ge=1)
-    """Epochs of each network, in place of those of gqn, transfer and gdn."""
+    """Epochs of each network, in place of those of gqn and gdn."""
     device: DeviceName = "auto"
     """auto: a CUDA device where there is one."""
 

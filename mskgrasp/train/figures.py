@@ -26,7 +26,7 @@ from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.reports.style import saved_figure
 
-_TITLES = {"gqn": "GQN", "transfer": "GDN's layers on the quality:", "gdn": "GDN"}
+_TITLES = {"gqn": "GQN", "gdn": "GDN"}
 _COLOURS = (BLUE, ORANGE, FAINT, GREEN)
 _BINS = 12
 _MM = 1e3
@@ -120,7 +120,7 @@ def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path)
         report: The final metrics as ``metrics.json`` holds them, with the trivial predictors' errors.
         path: The picture, PNG.
     """
-    stages = [name for name in ("gqn", "transfer", "gdn") if any(one.stage == name for one in history)]
+    stages = [name for name in _TITLES if any(one.stage == name for one in history)]
     with saved_figure(path, 11.5, 3.0 * len(stages)) as figure:
         panels = figure.subplots(len(stages), 3)
         for line, name in zip(panels, stages, strict=True):
@@ -136,8 +136,6 @@ def draw_curves(history: list[EpochMetrics], report: dict[str, Any], path: Path)
                 line[1].axhline(0.5, color=FAINT, lw=1, ls="--", label="chance")
                 line[1].set(title="Success: AUROC", xlabel="epoch", ylim=(0.3, 1.02))
                 line[1].legend(fontsize=8, loc="lower right")
-            if name == "transfer":
-                line[2].set_axis_off()
         gqn, gdn = report["gqn"], report["gdn"]
         bars = {
             "network": (gqn["brier"], _COLOURS[0]),

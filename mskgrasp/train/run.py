@@ -86,11 +86,9 @@ def _line(one: EpochMetrics) -> str:
 def run_training(config: TrainConfig) -> int:
     """Train, and write the model, its metrics, the log and the figures into ``config.out``."""
     if config.epochs is not None:
-        stages = {"gqn": config.gqn, "transfer": config.transfer, "gdn": config.gdn}
         shorter = {
             name: stage.model_copy(update={"epochs": config.epochs})
-            for name, stage in stages.items()
-            if stage is not None
+            for name, stage in (("gqn", config.gqn), ("gdn", config.gdn))
         }
         config = config.model_copy(update=shorter | {"epochs": None})
     if config.data is None or config.out is None:
@@ -131,9 +129,8 @@ def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, 
         )
     draw_curves(history, models.meta.metrics, out / "curves.png")
     if config.network.variance:
-        draw_uncertainty(
-            models, samples, sides.test if len(sides.test) else sides.validation, out / "uncertainty.png"
-        )
+        rows = sides.test if len(sides.test) else samples.random_of(sides.validation)
+        draw_uncertainty(models, samples, rows, out / "uncertainty.png")
     _write(out / "metrics.json", json.dumps(finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
     _write(out / "card.md", model_card(models.meta))
     save_model(out, models)  # last: it says that the training is finished

@@ -9,19 +9,16 @@ import numpy as np
 import torch
 
 from mskgrasp.core.config import check_config
-from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import ShardInfo
 from mskgrasp.dataset.commands.maniskill import physics_of
 from mskgrasp.parts import Part
-from mskgrasp.simulation.shard import Simulator
+from mskgrasp.simulation.shard import Simulator, lies_as
 from mskgrasp.view.motion import Motion
 from tasks import GraspDisplacementEnv
-
-SAME_M, SAME_RAD = 5e-4, 5e-3
-"""A part this near to its stored pose is in that pose, which was measured once it was at rest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,12 +64,10 @@ class AttemptSimulator:
         env = self._simulator.load(str(part.folder))
         number = int(row["attempt"])
         seed = 0 if number < 0 else scene_seeds(info.seed, info.part, number, int(row["draw"]))[0]
-        lay = Pose.from_vector(np.asarray(row["pose_base_obj"], np.float64))
+        lay = np.asarray(row["pose_base_obj"], np.float64)
         env.begin_episode(seed)
-        drawn = Pose.from_vector(env.part_pose().as_vector()[0].cpu().numpy().astype(np.float64))
-        moved, turned = pose_distance(drawn, lay)
-        if moved > SAME_M or turned > SAME_RAD:  # another formula drew it, or its number is not known
-            env.begin_episode(seed, lay.as_vector()[None])
+        if not lies_as(env, lay):  # another formula drew it, or its number is not known
+            env.begin_episode(seed, lay[None])
         return _recorded(env, np.asarray(row["grasp"], np.float32)[None])
 
     def close(self) -> None:

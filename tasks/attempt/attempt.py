@@ -169,6 +169,8 @@ class Attempt:
                 return bool((apart | (motion.gap() <= MIN_GAP)).all())
 
             motion.run_fingers(running & ~apart)
+            # Ends once the pads press with the settings' force; a drawn one that is greater is reached in the
+            # first steps of the lift.
             motion.move_fingers(-MAX_OPENING / 2, frozen=apart, check=all_closed)
             held, penetration = self.grip()
         # Parts that nothing holds come to rest before the others are lifted: when they are judged must not

@@ -79,9 +79,6 @@ def variants(ours: LearningConfig) -> dict[str, LearningConfig]:
         "no batch normalisation": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False})),
         "no weight decay": with_(gdn=ours.gdn.model_copy(update={"weight_decay": 0.0})),
         "neither": with_(gdn=ours.gdn.model_copy(update={"batch_norm": False, "weight_decay": 0.0})),
-        "features that learned the quality first": with_(
-            transfer=ours.gdn.model_copy(update={"epochs": ours.gqn.epochs})
-        ),
         "not calibrated": with_(calibrate=False),
         "mixed precision": with_(mixed_precision=True),
     }

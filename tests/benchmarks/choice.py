@@ -55,8 +55,7 @@ class Choice:
 
     def stages(self) -> tuple[str, ...]:
         """Names of the networks that it trains."""
-        transfer = ("transfer",) if self.config.transfer is not None and self.build is None else ()
-        return (*(("gqn",) if self.has_quality else ()), *transfer, "gdn")
+        return ("gqn", "gdn") if self.has_quality else ("gdn",)
 
     def folder(self, out: Path, seed: int) -> Path:
         """Folder of the training with a seed."""

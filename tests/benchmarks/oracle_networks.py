@@ -61,7 +61,7 @@ def read_numbers(images: Tensor) -> Tensor:
 
 
 class OracleFeatures(HandFeatures):
-    """Our features with k more images and m more numbers."""
+    """Our features, without residual blocks, with k more images and m more numbers."""
 
     def __init__(self, config: HandNetworkConfig, normalisation: Normalisation, n_more: int, n_numbers: int):
         super().__init__(config, normalisation, config.displacement_layers, config.patch_shape)

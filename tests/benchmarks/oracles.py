@@ -1,8 +1,8 @@
 """What the displacement's error is made of: python -m tests.benchmarks.oracles --help.
 
-Trains the same displacement network, each time with something that a camera does not see, on the training
-parts, and measures it on the validation parts, which also select its epoch. What it gains is what the error
-owes to not seeing that. No noise is added to any image, and nothing is calibrated.
+Trains our displacement network without its residual blocks, each time with something that a camera does not
+see, on the training parts, and measures it on the validation parts, which also select its epoch. What it
+gains is what the error owes to not seeing that. No noise is added to any image, and nothing is calibrated.
 """
 
 from __future__ import annotations
@@ -277,7 +277,8 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.benchmarks.oracles",
-        description="Train our displacement network with what a camera does not see, and compare.",
+        description="Train our displacement network, without its residual blocks, with what a camera does "
+        "not see, and compare.",
     )
     parser.add_argument("--data", type=Path, required=True, help="dataset folder")
     parser.add_argument("--out", type=Path, required=True, help="folder of images, trainings and reports")

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from mskgrasp.core.config import read_config
-from mskgrasp.learning.config import LearningConfig, StageConfig
+from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.network_config import PatchNetworkConfig
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import Sides
@@ -71,11 +71,8 @@ def paper_choices(
 
 def with_stages(config: LearningConfig, **changes: object) -> LearningConfig:
     """A configuration with changed optimisation of all networks."""
-    stages: dict[str, StageConfig | None] = {
-        name: getattr(config, name) for name in ("gqn", "transfer", "gdn")
-    }
     return config.model_copy(
-        update={name: stage.model_copy(update=changes) for name, stage in stages.items() if stage is not None}
+        update={name: getattr(config, name).model_copy(update=changes) for name in ("gqn", "gdn")}
     )
 
 

@@ -17,6 +17,7 @@ from mskgrasp.learning.sides import Sides, split
 from mskgrasp.learning.stage import Reporter
 from tests.benchmarks.choice import Choice, Looks, Predictions
 from tests.benchmarks.conftest import Boxes
+from tests.benchmarks.paper_choices import with_stages
 from tests.benchmarks.training_cost import cost_of, cost_table
 from tests.benchmarks.trainings import make_trainings
 from tests.benchmarks.trainings_at_once import TrainingFailed
@@ -106,25 +107,25 @@ def test_trainings_in_processes_of_their_own_are_the_same(looks, sides, tmp_path
 
 @pytest.mark.slow
 def test_a_training_that_fails_in_a_process_of_its_own_ends_the_others(looks, sides, tmp_path, capfd):
-    made(looks, sides, tmp_path, [OWN])
-    (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
-    other = replace(OWN, config=CONFIG.model_copy(update={"noise_std": 0.0}))
+    wild = replace(OWN, config=with_stages(CONFIG, learning_rate=1e30))
     with pytest.raises(
-        TrainingFailed, match="the training of Own with seed 0 failed .exit code 1.: see above"
+        TrainingFailed, match="the training of Own with seed . failed .exit code 1.: see above"
     ):
-        made(looks, sides, tmp_path, [other], seeds=2, at_once=2)
-    assert "Own with seed 0: " in (told := capfd.readouterr().err) and "other settings" in told
+        made(looks, sides, tmp_path, [wild], seeds=2, at_once=2)
+    assert "Own with seed " in (told := capfd.readouterr().err) and "loss became nan" in told
     assert not multiprocessing.active_children()
 
 
 def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_path):
     made(looks, sides, tmp_path, [OWN])
-    (OWN.folder(tmp_path, 0) / "validation.npz").unlink()
     with pytest.raises(UsageError, match="training of other settings; choose another --out"):
         made(looks, sides, tmp_path, [replace(OWN, config=CONFIG.model_copy(update={"noise_std": 0.0}))])
     fewer = replace(sides, training=sides.training[::2])
     with pytest.raises(UsageError, match="training of other rows"):
         made(looks, fewer, tmp_path, [OWN])
+    some = {"validation": sides.validation[::2]}
+    with pytest.raises(UsageError, match="training of other validation grasps"):
+        make_trainings([OWN], seeds=1, looks=looks, sides=sides, groups=some, out=tmp_path, measure_s=0.01)
 
 
 @pytest.mark.slow

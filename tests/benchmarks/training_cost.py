@@ -17,7 +17,7 @@ from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples
 from mskgrasp.learning.sides import Sides
 from mskgrasp.learning.stage import Reporter, Stage
-from mskgrasp.learning.trainer import describe_networks, stages_of
+from mskgrasp.learning.trainer import describe_networks
 from mskgrasp.runtime.console_table import Table
 from mskgrasp.runtime.progress import Bar, progress
 from tests.benchmarks.choice import Choice, Looks
@@ -51,9 +51,8 @@ def cost_of(
     models.gqn.to(compute_device(device))
     models.gdn.to(compute_device(device))
     batch, validation, rates, counts, total = {}, {}, {}, {}, 0.0
-    stages = stages_of(models, choice.config)
     for name in choice.stages():
-        stage = Stage(name, stages[name], samples, sides, choice.config)
+        stage = Stage(name, models, samples, sides, choice.config)
         stage.network.train()
         rates[name], counts[name] = rate(stage, stage.learn, seconds), stage.n_samples
         stage.network.eval()
@@ -62,7 +61,7 @@ def cost_of(
         if name == "gdn":
             rows, predict = rows[samples.success[rows]], held_out.predict_grasp_displacement
         began = time.perf_counter()
-        predict(stages[name], samples, rows[:256])
+        predict(models, samples, rows[:256])
         validation[name] = (time.perf_counter() - began) * len(rows) / min(256, len(rows))
         batch[name] = stage.settings.batch_size / rates[name]
         total += stage.settings.epochs * (stage.batches * batch[name] + validation[name])

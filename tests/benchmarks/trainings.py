@@ -75,6 +75,9 @@ def make_trainings(
     """
     jobs = [(choice, seed) for seed in range(seeds) for choice in choices if seed in choice.seeds(seeds)]
     missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
+    for choice, seed in jobs:
+        if (folder := choice.folder(out, seed)).exists():
+            _check_origin(folder, _origin(choice, seed, looks, sides, groups))
 
     def make(choice: Choice, seed: int, reporter: Reporter) -> bool:
         folder = choice.folder(out, seed)
@@ -135,7 +138,7 @@ def _steps(choice: Choice, samples: Samples, sides: Sides) -> int:
     """Steps of all epochs of a training."""
     n_success = int(samples.success[sides.training].sum())
     balanced = 2 * min(n_success, len(sides.training) - n_success)
-    n_samples = {"gqn": balanced, "transfer": balanced, "gdn": n_success}
+    n_samples = {"gqn": balanced, "gdn": n_success}
     settings = {name: getattr(choice.config, name) for name in choice.stages()}
     return sum(one.epochs * math.ceil(n_samples[name] / one.batch_size) for name, one in settings.items())
 
@@ -164,10 +167,10 @@ def _make(
         return True  # made by another process in the meantime
     if choice.quality_of and not (_quality_folder(choice, out, seed) / DESCRIPTION).exists():
         return False
+    _check_origin(folder, _origin(choice, seed, looks, sides, groups))
     config = choice.config.model_copy(update={"seed": seed})
     samples = choice.samples(looks.of(config.network))
     sides = choice.sides(samples, sides)
-    _check_origin(folder, _origin(config, samples, sides))
     models = _trained(choice, config, samples, sides, out, reporter, compute_device(device))
     for name, rows in groups.items():
         if not (path := folder / f"{name}.npz").exists():
@@ -238,14 +241,23 @@ def displacement_trained(
     return models
 
 
-def _origin(config: LearningConfig, samples: Samples, sides: Sides) -> dict[str, Any]:
-    rows = np.concatenate([sides.training.numpy(), sides.validation.numpy()])
+def _origin(
+    choice: Choice, seed: int, looks: Looks, sides: Sides, groups: dict[str, Tensor]
+) -> dict[str, Any]:
+    """What a training and its predictions are made of."""
+    samples = choice.samples(looks.of(choice.config.network))
+    sides = choice.sides(samples, sides)
     return {
-        "settings": config.model_dump(mode="json"),
+        "settings": choice.config.model_copy(update={"seed": seed}).model_dump(mode="json"),
         "data": samples.fingerprint,
         "samples_version": SAMPLES_VERSION,
-        "rows": hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest(),
+        "rows": _digest(sides.training, sides.validation),
+        **{f"{name} grasps": _digest(rows) for name, rows in groups.items()},
     }
+
+
+def _digest(*rows: Tensor) -> str:
+    return hashlib.sha256(torch.cat(rows).contiguous().numpy().tobytes()).hexdigest()
 
 
 def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
@@ -253,8 +265,10 @@ def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
     path = folder / _MADE_OF
     if path.exists():
         before = json.loads(path.read_text(encoding="utf-8"))
-        if changed := [name for name, value in origin.items() if before.get(name) != value]:
+        # A group that was not asked for before is predicted now.
+        if changed := [name for name, value in origin.items() if before.get(name, value) != value]:
             raise UsageError(
                 f"{folder} holds a training of other {' and '.join(changed)}; choose another --out"
             )
+        origin = before | origin
     write_whole(path, (json.dumps(origin, indent=1) + "\n").encode())

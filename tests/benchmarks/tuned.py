@@ -47,7 +47,7 @@ def tuned(samples: Samples, config: LearningConfig, attempts: int) -> Models:
     shipped = load_models(PRETRAINED)
 
     def start(meta: ModelMeta) -> Models:
-        return load_models(PRETRAINED)
+        return load_models(PRETRAINED).uncalibrated()  # the epoch is selected by what is trained
 
     cost = cost_of(Choice(name="tuned", config=config, build=start), samples, sides, 2.0)
     with progress(unit="s", total=round(cost.total_s), title="tune") as bar:

@@ -48,6 +48,8 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_part_is_summed_up_over_its_shards(dataset: Path):
     a, b = summarise_parts(dataset, PartFilter(min_success=0.1))
     assert (a.part, a.attempts, a.successes, a.kept) == ("a", 5, 3, True)
+    # 2 of 3 in the first shard, by which the collector decides, 3 of 5 in all.
+    assert not summarise_parts(dataset, PartFilter(max_success=0.62))[0].kept
     assert a.median_displacement == pytest.approx(0.005) and a.median_turn == pytest.approx(0.2)
     assert a.median_tilt == pytest.approx(0.02)
     assert a.failures == {"missed": 1, "slipped": 1} and a.discarded == {"unsettled": 2}

@@ -279,6 +279,13 @@ def test_missing_shards_and_parts_are_named(data):
     assert list(faults(data)) == [f"{NUT}-0000.h5", f"{NUT}-0001.h5"]
 
 
+def test_a_part_that_was_given_by_its_folder_is_not_missed_under_the_folders_name(data):
+    settings = yaml.safe_load((data / "config.yaml").read_text())
+    settings["parts"] = ["a_copy", *settings["parts"]]
+    (data / "config.yaml").write_text(yaml.safe_dump(settings))
+    assert not faults(data)
+
+
 def test_settings_that_ask_for_absurdly_many_shards_are_answered_at_once(data):
     settings = yaml.safe_load((data / "config.yaml").read_text())
     settings |= {"attempts_per_part": 10**12, "shard_size": 1}
@@ -402,7 +409,8 @@ def test_a_folder_that_is_no_dataset_is_a_usage_error(tmp_path):
 
 
 def test_a_part_whose_name_leads_out_of_the_folder_hides_no_other_fault(data):
-    attribute(shard(data), "part", "../../x")
     shard(data, f"{KEY}-0001.h5").unlink()
-    found = faults(data)
-    assert len(found) >= 2 and any("is missing" in reason for reason in found.values())
+    for name in ("../../x", "/x", "a" * 300):
+        attribute(shard(data), "part", name)
+        found = faults(data)
+        assert len(found) >= 2 and any("is missing" in reason for reason in found.values())

@@ -83,7 +83,7 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
         "model_baselines",
         "equal_recipes",
         "paper_networks",
-        "displacement_same_data",
+        "displacement_networks",
         "oracles",
     ]
     for name in (*runs, "oracles"):
@@ -96,7 +96,7 @@ def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
         "end",
         "run: paper_networks",
         "end",
-        "run: displacement_same_data",
+        "run: displacement_networks",
         "end",
         "run: oracles",
         "end",

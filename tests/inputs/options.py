@@ -110,8 +110,8 @@ ROWS = [
     Row(
         "train",
         "an option of what is not chosen",
-        _words("--transfer.epochs", "2"),
-        "--transfer.epochs belongs to settings that are not chosen",
+        _words("--network.channels", "2"),
+        "--network.channels belongs to settings that are not chosen",
     ),
     Row("train", "no data", _words("--out", "model"), "--data is needed"),
     Row("evaluate", "no such part", _words("--parts", "hex_nut_m31"), "hex_nut_m31"),

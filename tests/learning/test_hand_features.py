@@ -49,21 +49,3 @@ def test_blocks_are_given_for_every_convolution_or_none():
         HandNetworkConfig(displacement_layers=(4, 8), displacement_blocks=(1,))
     with pytest.raises(ValueError, match="blocks has 1 numbers, layers has 2"):
         HandNetworkConfig(layers=(4, 8), blocks=(1,))
-
-
-def test_a_quality_network_with_the_layers_of_the_displacement_network_has_weights_of_the_same_shapes():
-    config = HandNetworkConfig(
-        patch_pixels=17,
-        patch_columns=9,
-        quality_stride=2,
-        displacement_layers=(4, 8),
-        displacement_blocks=(1, 0),
-    )
-    models = build_models(ModelMeta(network=config.of_displacement, normalisation=NORMAL))
-    shapes = [
-        {name: value.shape for name, value in network.features.state_dict().items()}
-        for network in (models.gqn, models.gdn)
-    ]
-    assert shapes[0] == shapes[1]
-    inputs = torch.rand(3, 1, 17, 9), torch.zeros(3, 3), torch.full((3,), 0.02)
-    assert models.quality(*inputs).shape == (3,)

@@ -68,17 +68,24 @@ def test_a_damaged_shard_is_named_by_any_number_of_readers(tmp_path, workers):
 def test_parts_outside_the_success_range_are_left_out(dataset):
     samples = read_samples(dataset, PATCH.network)
     rates = sorted(
-        float(samples.success[samples.part == i].float().mean()) for i in range(len(samples.parts))
+        float(samples.success[samples.part == i].double().mean()) for i in range(len(samples.parts))
     )
     middle = rates[len(rates) // 2]
     kept = samples.of_parts_between(0.0, middle)
     assert 0 < len(kept.parts) < len(samples.parts) and len(kept) < len(samples)
     for i, name in enumerate(kept.parts):
         rows = samples.part == samples.parts.index(name)
-        assert float(kept.success[kept.part == i].float().mean()) <= middle
+        assert float(kept.success[kept.part == i].double().mean()) <= middle
         assert torch.equal(kept.patches[kept.part == i], samples.patches[rows])
     with pytest.raises(BadDataset, match="widen success_range"):
         samples.of_parts_between(0.999, 0.9991)
+    # The bounds belong to the range: 32 of 80, which is more than 0.4 in single precision.
+    first = samples.part == 0
+    success = samples.success.clone()
+    success[first] = torch.arange(int(first.sum())) < 32
+    assert int(first.sum()) == 80
+    exact = dataclasses.replace(samples, success=success).of_parts_between(0.4, 0.4)
+    assert exact.parts[0] == samples.parts[0]
 
 
 def test_planned_attempts_join_those_of_the_same_parts(dataset, tmp_path):

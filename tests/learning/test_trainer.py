@@ -15,13 +15,12 @@ from safetensors.torch import save_file
 from mskgrasp.core import metrics
 from mskgrasp.core.errors import BadDataset, BadModel, UsageError
 from mskgrasp.learning.config import LearningConfig, StageConfig
-from mskgrasp.learning.grasp_models import ModelCalibration, Models, load_models, save_model
+from mskgrasp.learning.grasp_models import Models, load_models, save_model
 from mskgrasp.learning.held_out import calibrate, predict_grasp_displacement
 from mskgrasp.learning.model_metrics import EpochMetrics
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.sides import split
-from mskgrasp.learning.stage import Reporter, Stage, TrainingDiverged
-from mskgrasp.learning.trainer import stages_of
+from mskgrasp.learning.stage import Reporter, TrainingDiverged
 from mskgrasp.learning.trainer import train as learn
 from tests import synthetic
 from tests.learning.small import HAND, PATCH, SHORT
@@ -90,62 +89,6 @@ def test_a_stopped_run_goes_on_to_the_same_weights(samples, learned, tmp_path, a
             for a, b in zip(one.state_dict().values(), other.state_dict().values(), strict=True)
         )
     assert [one.train_loss for one in again] == [one.train_loss for one in history]
-
-
-TRANSFER = HAND.model_copy(
-    update={
-        "gqn": SHORT.gqn,
-        "transfer": StageConfig(learning_rate=4e-3, epochs=2, batch_size=32),
-        "gdn": StageConfig(learning_rate=1e-30, schedule="constant", epochs=1, batch_size=32),
-    }
-)
-"""The displacement network keeps the features that it starts with."""
-
-
-@pytest.fixture(scope="module")
-def hand_samples(dataset) -> Samples:
-    """The dataset as the network of the hand sees it."""
-    return read_samples(dataset, TRANSFER.network)
-
-
-def test_the_displacement_network_starts_from_features_that_learned_the_quality(hand_samples, tmp_path):
-    samples = hand_samples
-    models, history = learn(samples, TRANSFER, checkpoint_path=tmp_path / "whole")
-    assert [one.stage for one in history] == ["gqn", "gqn", "transfer", "transfer", "gdn"]
-    assert history[3].auroc is not None and history[3].validation_loss < history[2].validation_loss
-    sides = split(samples, TRANSFER)
-    stage = Stage("transfer", stages_of(models, TRANSFER)["transfer"], samples, sides, TRANSFER)
-    for number in range(2):
-        stage.epoch(number, Reporter())
-    learned, started = stage.network.features.state_dict(), models.gdn.features.state_dict()
-    for name, values in learned.items():
-        assert torch.allclose(values, started[name], atol=1e-6)
-    without = TRANSFER.model_copy(update={"transfer": None})
-    other, _ = learn(samples, without, checkpoint_path=tmp_path / "without")
-    assert not torch.allclose(other.gdn.features.image[0].weight, models.gdn.features.image[0].weight)
-    for a, b in zip(models.gqn.state_dict().values(), other.gqn.state_dict().values(), strict=True):
-        assert torch.equal(a, b)  # the quality network knows nothing of it
-
-
-@pytest.mark.parametrize("after", [pytest.param(2, marks=pytest.mark.slow), 3, 4])
-def test_a_run_with_transfer_goes_on_to_the_same_weights(hand_samples, learned, tmp_path, after):
-    samples = hand_samples
-    config = TRANSFER.model_copy(update={"gdn": SHORT.gdn})
-    whole, history = learned(samples, config)
-    with pytest.raises(KeyboardInterrupt):
-        learn(samples, config, checkpoint_path=tmp_path / "c", reporter=StopAfter(after))
-    resumed, again = learn(samples, config, checkpoint_path=tmp_path / "c")
-    for a, b in zip(whole.gdn.state_dict().values(), resumed.gdn.state_dict().values(), strict=True):
-        assert torch.equal(a, b)
-    assert [one.train_loss for one in again] == [one.train_loss for one in history]
-
-
-def test_a_checkpoint_of_a_stage_that_is_not_wanted_any_more_is_refused(hand_samples, tmp_path):
-    with pytest.raises(KeyboardInterrupt):
-        learn(hand_samples, TRANSFER, checkpoint_path=tmp_path / "c", reporter=StopAfter(3))
-    without = TRANSFER.model_copy(update={"transfer": None})
-    with pytest.raises(UsageError, match="made with other settings"):
-        learn(hand_samples, without, checkpoint_path=tmp_path / "c")
 
 
 def test_the_seed_decides_the_weights_and_the_global_generator_is_left_alone(samples, learned, tmp_path):
@@ -283,16 +226,10 @@ def test_the_hand_network_learns_what_the_centre_alone_does_not_tell_and_is_cali
     assert 0.6 < by_distance < report["gqn"]["auroc"] - 0.1
     # The closing jaw centres a box: 85 % of its motion can be foreseen. The turn takes more samples.
     assert report["gdn"]["translation_rmse"] < 0.25 * report["gdn"]["training_mean"]["translation_rmse"]
-    assert report["gdn"]["n"] >= 50 and found == calibrate(uncalibrated(models), samples, rows)
+    assert report["gdn"]["n"] >= 50 and found == calibrate(models, samples, rows)
     assert found.quality_slope > 0 and min(found.variance_scale) > 0 and max(found.variance_scale) != 1.0
     save_model(tmp_path / "model", models)
     assert load_models(tmp_path / "model").meta.calibration == found
-
-
-def uncalibrated(models: Models) -> Models:
-    return dataclasses.replace(
-        models, meta=models.meta.model_copy(update={"calibration": ModelCalibration()})
-    )
 
 
 @pytest.mark.slow

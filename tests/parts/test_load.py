@@ -1,3 +1,5 @@
+import shutil
+
 import pytest
 
 from mskgrasp.core.errors import BadPart, UnknownPart
@@ -29,6 +31,15 @@ def test_a_file_that_is_not_there_is_named_as_a_file(tmp_path, monkeypatch):
     (store.parts_folder() / "bracket").mkdir(parents=True)
     with pytest.raises(UnknownPart, match=r"bracket\.stl is a CAD file: name the part bracket, or import"):
         find_part(file)
+
+
+def test_a_folder_stays_that_part_where_its_bare_name_is_another_ones(tmp_path, monkeypatch):
+    folder = shutil.copytree(find_part("washer_m36").folder, tmp_path / "hex_nut_m30")
+    monkeypatch.chdir(tmp_path)
+    found = find_part("./hex_nut_m30")
+    assert found.folder == folder and found.name == "washer_m36"
+    assert find_part(str(found.folder)).content_hash == found.content_hash  # as a worker looks it up
+    assert find_part("hex_nut_m30").name == "hex_nut_m30"
 
 
 def test_an_unknown_name_lists_similar_ones():

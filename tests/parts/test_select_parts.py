@@ -67,6 +67,7 @@ def test_a_held_out_set_of_the_catalogue_leaves_out_what_the_model_was_trained_o
     write_index(make_index([entry_of(name) for name in names], {}, read_index()))
     assert part_names(("test",), {}) == ["l_bracket_40x40", "shaft_collar_25"]
     assert part_names(("test",), {"training_parts": ["shaft_collar_25"]}) == ["l_bracket_40x40"]
+    assert part_names(("test",), {"validation_parts": ["shaft_collar_25"]}) == ["l_bracket_40x40"]
     assert part_names(("train",), {}) == ["hex_nut_m20"]
 
 

@@ -113,6 +113,11 @@ def test_state_can_be_saved_and_restored(boxes):
     env.reset(seed=1)
     base.set_state_dict(state)
     assert torch.allclose(base.part_pose().as_vector(), pose, atol=1e-6)
+    x, y, z = pose[0, :3].tolist()
+    *_, info = env.step(np.array([x, y, max(z, 0.0105), 0.0], dtype=np.float32))
+    assert "displacement" in info
+    base.set_state_dict(state)
+    assert "displacement" not in base.get_info()  # that was the outcome of the attempt before
     env.close()
 
 

@@ -49,15 +49,6 @@ def test_curves_of_a_run_without_variances_are_drawn_beside_the_trivial_predicto
     in_degrees = [line.get_ydata()[0] for line in rotation.lines]
     assert in_degrees == pytest.approx([11.459, 17.189, 14.324], abs=1e-3)
     picture(tmp_path / "curves.png")
-    between = EpochMetrics(
-        stage="transfer", epoch=1, train_loss=0.5, validation_loss=0.55, auroc=0.7, seconds=1.0
-    )
-    draw_curves([*history[:2], between, history[2]], report, tmp_path / "transfer.png")
-    shown = np.array(kept[1].axes).reshape(3, 3)
-    assert [line.get_ydata()[0] for line in shown[1, 0].lines] == [0.5, 0.55]
-    assert shown[1, 1].lines[0].get_ydata()[0] == 0.7 and not shown[1, 2].axison
-    assert [line.get_ydata()[0] for line in shown[2, 1].lines] == pytest.approx(in_mm)
-    picture(tmp_path / "transfer.png")
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.settings import TABLE_Z
+from mskgrasp.dataset import depth_to_u16
 from mskgrasp.perception.part_detection import view_part
 from tasks.scene.renderer import render_backend
 
@@ -59,3 +60,20 @@ def test_the_seen_box_is_the_real_box(seeing):
     )
     assert view.centre_base == pytest.approx([0.463, 0.071, 0.015], abs=1.1e-3)
     assert sorted(view.size) == pytest.approx([0.02, 0.03, 0.04], abs=2.2e-3)
+
+
+def test_beyond_the_table_nothing_is_seen_and_a_shard_holds_no_depth(boxes):
+    env = gymnasium.make(
+        "GraspDisplacement-v1", parts=[str(boxes["light"].folder)], obs_mode="none",
+        render_backend=render_backend(), camera=dict(height=2.5),
+    ).unwrapped  # fmt: skip
+    depth = place(env, 0.5, 0.0)
+    env.close()
+    rows, columns = np.mgrid[0:160, 0:160]
+    base_x = 0.5 - (rows - 79.5) / 365.5 * 2.5
+    base_y = -(columns - 79.5) / 365.5 * 2.5
+    # The table ends at x = 0.95 and y = 0.7; a pixel beside its edge may see either.
+    off = np.maximum(np.abs(base_x - 0.45) - 0.5, np.abs(base_y) - 0.7)
+    assert np.isnan(depth[off > 0.01]).all() and (off > 0.01).sum() > 100
+    assert np.isfinite(depth[off < -0.01]).all()
+    assert not depth_to_u16(depth)[off > 0.01].any()
