@@ -17,7 +17,7 @@ _EXAMPLE = """Order of work, for a part of your own:
   mskgrasp demo                                            # what a grasp and its shift look like
   mskgrasp plan --part my_bracket.stl                      # one grasp, planned: out/plan/plan.png
   mskgrasp assess my_bracket.stl --tolerance 1mm,2deg      # how precisely it can be grasped and placed
-  mskgrasp collect --parts my_bracket --out data/mine      # data for networks that know your parts
+  mskgrasp collect --parts starter my_bracket --out data/mine   # data for networks that know your part
   mskgrasp train --data data/mine --out models/mine
   mskgrasp evaluate --models models/mine --parts my_bracket
   mskgrasp doctor --cell my_cell.yaml                      # on a real cell; then --cell everywhere

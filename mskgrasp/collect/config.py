@@ -65,7 +65,8 @@ class CollectConfig(Config):
     out: Path = Path("data/demo")
     """Folder of the dataset; a run into a folder with the same settings resumes it."""
     parts: tuple[str, ...] = ()
-    """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
+    """Names or folders of parts, or sets: starter, catalogue, train, validation, test, new_sizes; empty:
+    starter."""
     sample: int = Field(default=0, ge=0)
     """Approximate number of parts, some of every family; 0: all. Only for the catalogue's parts."""
     attempts_per_part: int = Field(default=200, ge=1, le=1_000_000)

@@ -103,7 +103,8 @@ class ValidateConfig(Config):
     out: Path = Path("out/validate")
     """Folder of the report and of the outcomes, from which a stopped run resumes."""
     parts: tuple[str, ...] = ()
-    """Names or folders of parts, or sets: starter, catalogue, train, validation, test; empty: starter."""
+    """Names or folders of parts, or sets: starter, catalogue, train, validation, test, new_sizes; empty:
+    starter."""
     grasps_per_part: int = Field(default=20, ge=1, le=100_000)
     """Grasps of each part that are drawn, and tried under production's setting; no setting gets more."""
     variant_grasps_per_part: int = Field(default=8, ge=1)

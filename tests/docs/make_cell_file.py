@@ -74,7 +74,7 @@ SECTIONS: tuple[tuple[str, str, tuple[tuple[str, type[BaseModel]], ...]], ...] =
             ("both", SimulatedCellConfig),
             ("`type: sapien`, in addition", SapienCellConfig),
             ("`type: mujoco`, in addition", MujocoCellConfig),
-            ("`camera`", Overhead),
+            ("`camera`, and `overhead` of `driver: sapien`", Overhead),
             ("`noise`", SensorNoise),
             ("`table_error`", TableError),
             ("`tape`", Tape),

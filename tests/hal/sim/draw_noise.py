@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ TITLES: dict[NoiseModel, str] = {
 
 def main() -> None:
     """Renders the part once and disturbs it three times."""
+    argparse.ArgumentParser(description="Draw docs/noise.png anew.").parse_args()
     with open_cell("configs/cells/sapien.yaml") as cell:
         assert cell.feeder is not None
         cell.feeder.present(PART, 0)
