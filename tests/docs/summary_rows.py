@@ -254,7 +254,7 @@ def _paper_networks(stored: StoredReport) -> list[SummaryRow]:
 
 def _displacement_networks(stored: StoredReport) -> list[SummaryRow]:
     models = _report(stored)["models"]
-    novel = {name: one for name, one in models.items() if "novel" in one["quality"]}
+    novel = {name: one for name, one in models.items() if one["quality"]["novel"]["trials"]}
 
     def row(name: str, policy: str) -> SummaryRow:
         found = {model: one[policy]["novel"] for model, one in novel.items() if policy in one}
