@@ -257,7 +257,7 @@ def _displacement_networks(stored: StoredReport) -> list[SummaryRow]:
     novel = {name: one for name, one in models.items() if one["quality"]["novel"]["trials"]}
 
     def row(name: str, policy: str) -> SummaryRow:
-        found = {model: one[policy]["novel"] for model, one in novel.items() if policy in one}
+        found = {model: one[policy]["novel"] for model, one in novel.items() if one[policy]}
         return SummaryRow(
             name=name,
             text="displacement RMSE "
