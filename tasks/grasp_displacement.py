@@ -119,9 +119,9 @@ class GraspDisplacementEnv(BaseEnv):
         self.T_base_camera = self.overhead.T_base_camera(self.region_centre)
         self._part_names = list(parts) if parts else None
         self._n_scenes = num_envs
-        # Other parts may be assigned later, and ManiSkill sizes PhysX's buffers once: every sub-scene has
-        # room for the most complex part of the catalogue.
-        self._most_hulls = max([MOST_HULLS, *(find_part(name).n_hulls for name in self._part_names or [])])
+        # ManiSkill sizes PhysX's buffers once: every sub-scene has room for the most complex of these parts.
+        names = self._part_names or []
+        self._most_hulls = max((find_part(name).n_hulls for name in names), default=MOST_HULLS)
         self.parts: list[Part] = []
         self._standing: dict[str, StandingPoses] = {}
         self._outcome: dict[str, Tensor] | None = None

@@ -158,16 +158,16 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
         f"{1e3 * CAMERA_POSITION:g} mm along each axis and {np.degrees(CAMERA_TURN):g} degrees (standard "
         "deviations), and the truth leave what the way to the target and the release add.",
         *(
-            f"{name} is made of networks that were trained on {n} of these parts."
-            for name, n in facts.trained_on.items()
+            f"The networks of {names} were trained on {n} of these parts."
+            for names, n in _alike(facts.trained_on)
         ),
         *(
-            f"{name} is made of networks that {n} of these parts chose (early stopping) and calibrated."
-            for name, n in facts.chosen_by.items()
+            f"The networks of {names} were chosen (early stopping) and calibrated by {n} of these parts."
+            for names, n in _alike(facts.chosen_by)
         ),
         *(
-            f"The networks of {name} were trained on other parts of the families of {n} of these parts."
-            for name, n in facts.known_families.items()
+            f"The networks of {names} were trained on other parts of the families of {n} of these parts."
+            for names, n in _alike(facts.known_families)
         ),
     ]
     return Section(
@@ -188,6 +188,14 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
             )
         ],
     )
+
+
+def _alike(numbers: Mapping[str, int]) -> list[tuple[str, int]]:
+    """Planners of the same number in words, and that number."""
+    by_number: dict[int, list[str]] = {}
+    for name, n in numbers.items():
+        by_number.setdefault(n, []).append(name)
+    return [(" and ".join(names), n) for n, names in by_number.items()]
 
 
 def _tolerances_section(rows: Sequence[Row]) -> Section:

@@ -274,8 +274,14 @@ def _missing(
                 reason = f"holds {shard.n} attempts, {made} with those discarded, must be {expected}"
                 yield Fault(path=shard.path, reason=reason)
     words = settings.get("parts")
+    asked = {str(word) for word in words} if isinstance(words, (list, tuple)) else set()
     # A part may also be given by its folder, whose own name need not be the part's.
-    asked = [str(word) for word in words if is_known(str(word))] if isinstance(words, (list, tuple)) else []
+    unknown = sorted(word for word in asked - highest.keys() if not is_known(word))
+    missed = len(unknown) - len(highest.keys() - asked)
+    if missed > 0:
+        reason = f"names {missed} more parts than there are shards of; not found: {', '.join(unknown)}"
+        yield Fault(path=folder / "config.yaml", reason=reason)
+    asked.difference_update(unknown)
     for part in sorted({*highest, *asked}):
         n = -(-plan[0] // plan[1]) if plan else highest.get(part, 0) + 1
         n = 1 if part in one_is_enough else n

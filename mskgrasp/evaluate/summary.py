@@ -47,7 +47,7 @@ class TrialStatistics:
         reasons: Numbers of failures by reason.
         unmeasured: Numbers of unmeasured successes by reason.
         measured: Number of trials with a measured and a predicted displacement, which the errors are of.
-        translation_interval: Interval of the RMSE over parts (`rms_interval`); None for fewer than three.
+        translation_interval: Interval of the RMSE over parts (`rms_interval`); None where it is unbounded.
         rotation_interval: The same of the turn.
         translation_rmse_of_zero: RMSE of predicting no displacement for the same grasps.
         rotation_rmse_of_zero: The same of the turn.

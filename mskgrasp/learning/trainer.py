@@ -101,7 +101,8 @@ def train(
 
     Raises:
         BadDataset: The data cannot be split, or lack successes or failures.
-        UsageError: The checkpoint was made from other data, or with another version or split of the samples.
+        UsageError: The checkpoint was made from other data, with another version or split of the samples, or
+            with other settings.
         TrainingDiverged: The loss is not finite.
     """
     reporter = reporter or Reporter()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import gc
-import itertools
 from collections import Counter
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -145,12 +145,11 @@ class Simulator:
     def restore(self, task: ShardTask, labels: ShardLabels, dataset: Path) -> Iterator[int]:
         """Write a shard whose labels are known: its scenes are rendered, no grasp is tried; yield as `run`.
 
-        The labels hold for the scenes that they were made in. Where one comes out differently, because a
-        resting pose stands on one machine alone, the whole shard is simulated.
+        A label holds for the scene that it was made in. Where that comes out differently, because a resting
+        pose stands on one machine alone, the attempt is discarded.
 
         Raises:
-            BadDataset: The labels are not those of this task, or a planner chose the grasps of a scene that
-                comes out differently.
+            BadDataset: The labels are not those of this task.
         """
         env = self.load(task.folder)
         columns, info = labels.columns, labels.info
@@ -162,23 +161,16 @@ class Simulator:
                 f"{task.first} to {task.first + task.n - 1} of seed {task.seed}: use their settings"
             )
         images = np.zeros((len(numbers), self._camera.n_pixels, self._camera.n_pixels), np.uint16)
+        same = np.ones(len(numbers), dtype=bool)
         for row, (attempt, draw) in enumerate(zip(numbers.tolist(), columns["draw"].tolist(), strict=True)):
             images[row] = capture_scene(env, task.part, task.seed, attempt, draw)[0]
-            if not lies_as(env, columns["pose_base_obj"][row]):
-                if info.planner:
-                    raise BadDataset(
-                        f"attempt {attempt} at part '{task.part}' lies otherwise here than in its labels, "
-                        "whose grasps a planner chose: leave the part out"
-                    )
-                shard = self.write(task, dataset)
-                for _ in itertools.islice(shard, row):  # as many as are yielded already
-                    pass
-                yield from shard
-                return
-            yield int(columns["success"][row])
+            same[row] = lies_as(env, columns["pose_base_obj"][row])
+            yield int(columns["success"][row]) if same[row] else -1
         for _ in range(task.n - len(numbers)):
             yield -1
-        attempts = Attempts(depth=images, **columns)
+        if not same.all():
+            info = replace(info, discarded=info.discarded | {"lies_otherwise": int((~same).sum())})
+        attempts = Attempts(depth=images[same], **{name: values[same] for name, values in columns.items()})
         write_shard(shard_path(dataset, task.part, task.index), attempts, info)
 
     def close(self) -> None:

@@ -130,6 +130,8 @@ def _train_into(out: Path, config: TrainConfig, samples: Samples, sides: Sides, 
     draw_curves(history, models.meta.metrics, out / "curves.png")
     if config.network.variance:
         rows = sides.test if len(sides.test) else samples.random_of(sides.validation)
+        if not bool(samples.success[rows].any()):  # planned grasps alone may succeed
+            rows = sides.validation
         draw_uncertainty(models, samples, rows, out / "uncertainty.png")
     _write(out / "metrics.json", json.dumps(finite(models.meta.metrics), indent=2, allow_nan=False) + "\n")
     _write(out / "card.md", model_card(models.meta))

@@ -26,7 +26,7 @@ def facts_of(parts: list[BenchmarkPart]) -> RunFacts:
         parts=parts,
         trained_on={"ours": 1},
         chosen_by={"certified": 2},
-        known_families={"ours": 2},
+        known_families={"ours": 2, "certified": 2},
         settings=dict(seed=0),
     )
 
@@ -73,7 +73,7 @@ def test_the_numbers_are_stored(written):
     assert ours["within"]["predicted"][2][1]["n"] == 10 and centroid["lifted"]["n"] == 8
     assert centroid["reasons"] == {"slipped": 2}
     assert values["trained_on"] == {"ours": 1} and values["chosen_by"] == {"certified": 2}
-    assert values["known_families"] == {"ours": 2}
+    assert values["known_families"] == {"ours": 2, "certified": 2}
     assert values["parts"] == ["nut", "bracket"]
     assert {one["planner"] for one in values["refusals"]} == {"ours"}
     assert {one["part"] for one in values["budgets"]} == {"", "nut", "bracket"}
@@ -85,7 +85,11 @@ def test_the_tables_say_which_parts_can_be_bought_and_what_was_known(written):
     assert table.rows[0] == ("nut", "nut", "ISO 4032", "test", "5 of 5", "0 of 5")
     assert table.rows[1][2] == "-"
     first = sections["Placed within 1 mm and 2 degrees"]
-    assert any("ours is made of networks that were trained on 1 of these parts" in one for one in first.text)
+    assert first.text[2:] == [
+        "The networks of ours were trained on 1 of these parts.",
+        "The networks of certified were chosen (early stopping) and calibrated by 2 of these parts.",
+        "The networks of ours and certified were trained on other parts of the families of 2 of these parts.",
+    ]
     (budget,) = sections["Error budget"].tables
     assert budget.rows[0][:3] == ("ours", 10, "0.50 mm, 0.00 deg")
 

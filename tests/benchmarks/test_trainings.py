@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 from dataclasses import replace
 from pathlib import Path
@@ -123,6 +124,13 @@ def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_pat
     fewer = replace(sides, training=sides.training[::2])
     with pytest.raises(UsageError, match="training of other rows"):
         made(looks, fewer, tmp_path, [OWN])
+    made_of = OWN.folder(tmp_path, 0) / "made_of.json"
+    known = json.loads(made_of.read_text())
+    predicted = made_of.with_name("validation.npz")
+    before = predicted.stat().st_mtime_ns
+    made_of.write_text(json.dumps({name: known[name] for name in known if name != "validation grasps"}))
+    made(looks, sides, tmp_path, [OWN])  # nobody knows of which grasps: they are predicted again
+    assert predicted.stat().st_mtime_ns > before and json.loads(made_of.read_text()) == known
     some = {"validation": sides.validation[::2]}
     with pytest.raises(UsageError, match="training of other validation grasps"):
         make_trainings([OWN], seeds=1, looks=looks, sides=sides, groups=some, out=tmp_path, measure_s=0.01)

@@ -74,10 +74,10 @@ def make_trainings(
         TrainingFailed: A training in a process of its own ended with an error, which it has printed.
     """
     jobs = [(choice, seed) for seed in range(seeds) for choice in choices if seed in choice.seeds(seeds)]
-    missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
     for choice, seed in jobs:
         if (folder := choice.folder(out, seed)).exists():
             _check_origin(folder, _origin(choice, seed, looks, sides, groups))
+    missing = [job for job in jobs if not all(_path(out, *job, name).exists() for name in groups)]
 
     def make(choice: Choice, seed: int, reporter: Reporter) -> bool:
         folder = choice.folder(out, seed)
@@ -265,7 +265,8 @@ def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
     path = folder / _MADE_OF
     if path.exists():
         before = json.loads(path.read_text(encoding="utf-8"))
-        # A group that was not asked for before is predicted now.
+        for name in origin.keys() - before.keys():  # predicted for rows that are not known: predicted again
+            (folder / f"{name.removesuffix(' grasps')}.npz").unlink(missing_ok=True)
         if changed := [name for name, value in origin.items() if before.get(name, value) != value]:
             raise UsageError(
                 f"{folder} holds a training of other {' and '.join(changed)}; choose another --out"

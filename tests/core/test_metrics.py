@@ -166,7 +166,7 @@ def test_the_interval_of_an_rms_is_over_clusters_and_wide_where_they_differ():
     low, high = interval([*alike, np.array([9.0, 9.0])])
     assert low < 2.0 and high > 9.0
     assert metrics.rms_interval([np.zeros(2), np.zeros(3), np.zeros(2)]) == (0.0, 0.0)
-    # All that is known is in one cluster, or nearly: nothing is bound.
+    # All that is known is in one cluster, or nearly: nothing is bounded.
     assert metrics.rms_interval([np.zeros(2), np.zeros(2), np.array([3.0, 3.0])]) is None
     low, high = interval([np.array([1e-9])] * 19 + [np.array([1.0])])
     assert low < 1e-9 and high > 100.0

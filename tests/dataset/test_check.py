@@ -279,11 +279,16 @@ def test_missing_shards_and_parts_are_named(data):
     assert list(faults(data)) == [f"{NUT}-0000.h5", f"{NUT}-0001.h5"]
 
 
-def test_a_part_that_was_given_by_its_folder_is_not_missed_under_the_folders_name(data):
+def test_a_part_may_be_given_by_its_folder_and_every_part_that_was_asked_for_is_there(data):
     settings = yaml.safe_load((data / "config.yaml").read_text())
-    settings["parts"] = ["a_copy", *settings["parts"]]
+    for folder in ("a_copy", "../parts/a_copy"):
+        settings["parts"] = [folder if name == NUT else name for name in (NUT, KEY)]
+        (data / "config.yaml").write_text(yaml.safe_dump(settings))
+        assert not faults(data)
+    settings["parts"] = [NUT, KEY, "part_of_elsewhere"]
     (data / "config.yaml").write_text(yaml.safe_dump(settings))
-    assert not faults(data)
+    (reason,) = faults(data).values()
+    assert reason == "names 1 more parts than there are shards of; not found: part_of_elsewhere; "
 
 
 def test_settings_that_ask_for_absurdly_many_shards_are_answered_at_once(data):

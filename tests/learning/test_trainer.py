@@ -150,6 +150,14 @@ def test_a_checkpoint_of_samples_made_otherwise_is_refused(samples, stopped):
         learn(samples, SHORT, checkpoint_path=stopped)
 
 
+def test_a_checkpoint_of_a_stage_that_is_not_trained_is_refused(samples, stopped):
+    tensors, metadata = contents(stopped)
+    progress = json.loads(metadata["progress"]) | {"stage": "transfer"}
+    save_file(tensors, stopped, metadata={"progress": json.dumps(progress)})
+    with pytest.raises(UsageError, match="made with other settings"):
+        learn(samples, SHORT, checkpoint_path=stopped)
+
+
 def test_a_checkpoint_whose_optimiser_learned_other_layers_is_refused(samples, stopped):
     tensors, metadata = contents(stopped)
     first, second = "optimiser/0/exp_avg", "optimiser/1/exp_avg"

@@ -67,22 +67,23 @@ def test_a_shard_is_made_again_from_its_labels_and_its_seed(
         list(simulator.restore(dataclasses.replace(task, first=0), labels, tmp_path))
 
 
-def test_labels_of_another_scene_are_simulated_anew_where_no_planner_chose_the_grasp(
+def test_an_attempt_whose_scene_comes_out_differently_is_discarded(
     simulator: Simulator, collected: Path, tmp_path: Path
 ):
     export_labels(collected, tmp_path / "all.labels")
     labels = read_labels([tmp_path / "all.labels"])[PART, 1]
     poses = labels.columns["pose_base_obj"].copy()
-    poses[-1, 0] += 0.02  # as if another resting pose had been drawn
+    poses[0, 0] += 0.02  # as if another resting pose had been drawn
     elsewhere = dataclasses.replace(labels, columns=labels.columns | {"pose_base_obj": poses})
     task = ShardTask(part=PART, folder=str(find_part(PART).folder), index=1, first=3, n=3, seed=5)
-    (tmp_path / "shards").mkdir()
     yields = list(simulator.restore(task, elsewhere, tmp_path))
     (path,) = list_shards(tmp_path)
-    assert path.read_bytes() == (collected / "shards" / path.name).read_bytes() and len(yields) == 3
-    planned = dataclasses.replace(elsewhere, info=dataclasses.replace(labels.info, planner="0" * 64))
-    with pytest.raises(BadDataset, match=f"at part '{PART}' lies otherwise here than in its labels"):
-        list(simulator.restore(task, planned, tmp_path))
+    (attempts, info), (before, _) = read_shard(path), read_shard(collected / "shards" / path.name)
+    assert info.discarded == labels.info.discarded | {"lies_otherwise": 1}
+    assert (
+        np.array_equal(attempts.depth, before.depth[1:]) and len(attempts) + sum(info.discarded.values()) == 3
+    )
+    assert len(yields) == 3 and yields[0] == -1
 
 
 def test_force_and_friction_of_each_attempt_are_those_that_were_drawn(tmp_path: Path):

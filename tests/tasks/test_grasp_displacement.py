@@ -165,6 +165,17 @@ def test_wrong_settings_are_named(boxes):
         make(boxes, parts=["no_such_part"])
 
 
+def test_on_a_gpu_a_part_of_more_hulls_than_there_is_room_for_is_refused(boxes, monkeypatch):
+    made = make(boxes, obs_mode="none").unwrapped
+    monkeypatch.setattr(
+        type(made), "gpu_sim_enabled", True
+    )  # there is none: what is drawn up, not what it does
+    with pytest.raises(BadConfig, match="this environment's memory is for 1: name the part when"):
+        made._load_scene({"parts": ["hex_nut_m30"]})
+    monkeypatch.undo()
+    made.close()
+
+
 def test_other_parts_without_a_new_scene_are_refused(env):
     with pytest.raises(BadConfig, match="other parts are loaded with reconfigure=True alone"):
         env.reset(seed=0, options=dict(parts=["hex_nut_m30"]))

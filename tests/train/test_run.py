@@ -15,6 +15,7 @@ from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import list_shards, read_shard, shard_path, write_shard
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.grasp_models import load_models
+from mskgrasp.learning.sides import split
 from mskgrasp.train import run as train
 from mskgrasp.train.__main__ import main
 from mskgrasp.train.config import TrainConfig
@@ -128,6 +129,22 @@ def test_datasets_that_do_not_belong_together_are_not_learned(dataset, tmp_path,
 
 
 @pytest.mark.slow
+def test_uncertainty_is_drawn_where_planned_grasps_alone_succeed_at_the_held_out_parts(
+    dataset, tmp_path, monkeypatch
+):
+    read = train._read
+
+    def without_random_successes(config, data):
+        samples = read(config, data)
+        held_out = torch.isin(torch.arange(len(samples)), split(samples, config).validation)
+        return dataclasses.replace(samples, success=samples.success & (samples.planned | ~held_out))
+
+    monkeypatch.setattr(train, "_read", without_random_successes)
+    planned, out = planned_boxes(tmp_path / "planned"), tmp_path / "model"
+    assert train.run_training(program(SHORT, data=dataset, planned=(planned,), out=out, epochs=1)) == 0
+    assert (out / "uncertainty.png").exists() and (out / "model.json").exists()
+
+
 def test_planned_grasps_are_learned_beside_random_ones_and_named_in_the_model(dataset, tmp_path):
     planned, out = planned_boxes(tmp_path / "planned"), tmp_path / "model"
     both = program(SHORT, data=dataset, planned=(planned,), out=out, epochs=1)

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import sapien
+import torch
 from scipy.spatial.transform import Rotation
 
 import hal.sim.arm
 from hal import Cell, execute_grasp, go_home, put_down
 from hal.execute import RELEASE
+from hal.limits import lowest_point
 from hal.sim import SapienCellConfig, sapien_cell
-from hal.sim.arm import is_vertical
+from hal.sim.arm import SapienArm, is_vertical
 from hal.sim.world import SapienWorld
 from mskgrasp.core.geometry import pose_distance
 from mskgrasp.core.grasp import PAD_REACH, Grasp
+from mskgrasp.core.panda_kinematics import HOME, forward_pose
 from tests.hal.watching import check_watching
 
 
@@ -80,6 +84,18 @@ def _recorded_steps(cell: Cell, monkeypatch) -> list[tuple[int, float]]:
 
     monkeypatch.setattr(motion, "step", recorded)
     return made
+
+
+def test_a_tilted_hand_is_in_the_air_only_above_its_lowest_corner():
+    joints = torch.tensor(HOME, dtype=torch.float64)[None].repeat(2, 1)
+    joints[1, 5] += 0.5  # tilts the hand
+    for row in joints:
+        lowest = lowest_point(forward_pose(row.numpy()))
+        for gap, clear in ((-1e-4, True), (1e-4, False)):
+            top = lowest - hal.sim.arm.AIR_GAP + gap
+            world = SimpleNamespace(top=lambda top=top: top, reach=lambda pose: None)
+            arm = SimpleNamespace(_force=0.0, _world=world)
+            assert SapienArm._clear(arm, row[None]).tolist() == [clear]  # pyright: ignore
 
 
 def test_while_a_part_falls_or_one_beside_moves_all_steps_are_short(cell: Cell, monkeypatch):
