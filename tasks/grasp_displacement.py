@@ -30,7 +30,7 @@ from tasks.attempt.attempt import Attempt
 from tasks.robot.contacts import HandContacts
 from tasks.robot.motion import PandaMotion
 from tasks.robot.panda import GraspPanda, panda_for
-from tasks.scene.camera import FAR, camera_config, without_reflection_table
+from tasks.scene.camera import camera_config, where_seen, without_reflection_table
 from tasks.scene.frames import BASE_IN_WORLD, base_pose, sapien_camera_pose, to_world
 from tasks.scene.part_actor import add_part
 from tasks.scene.physics import MOST_HULLS, sim_config
@@ -175,12 +175,12 @@ class GraspDisplacementEnv(BaseEnv):
         if names is None:
             names = [str(name) for name in self._batched_episode_rng.choice(list(starter_names()))]
         self.parts = [find_part(names[i % len(names)]) for i in range(self.num_envs)]
-        for part in self.parts:
-            if self.gpu_sim_enabled and part.n_hulls > self._most_hulls:
-                raise BadConfig(
-                    f"{part.name} has {part.n_hulls} hulls, this environment's memory is for "
-                    f"{self._most_hulls}: name the part when the environment is made"
-                )
+        most = max(self.parts, key=lambda part: part.n_hulls)
+        if self.gpu_sim_enabled and most.n_hulls > self._most_hulls:
+            raise BadConfig(
+                f"{most.name} has {most.n_hulls} hulls, this environment's memory is for "
+                f"{self._most_hulls}: name the part when the environment is made"
+            )
         self._build_table()
         actors = []
         for i, part in enumerate(self.parts):
@@ -318,24 +318,20 @@ class GraspDisplacementEnv(BaseEnv):
 
         NaN where the camera sees nothing, such as beyond the table.
         """
-        return self._render_overhead("depth", with_robot=False)["depth"][..., 0]
+        return where_seen(self._render_overhead(with_robot=False)["depth"][..., 0])
 
     def capture_rgbd(self, *, with_robot: bool = False) -> tuple[Tensor, Tensor]:
         """Colour (n, h, w, 3) uint8 and depth (n, h, w), as of `capture_depth`, from the overhead camera."""
-        images = self._render_overhead("rgb", "depth", with_robot=with_robot)
-        return images["rgb"], images["depth"][..., 0]
+        images = self._render_overhead(rgb=True, with_robot=with_robot)
+        return images["rgb"], where_seen(images["depth"][..., 0])
 
-    def _render_overhead(self, *textures: str, with_robot: bool) -> dict[str, Tensor]:
+    def _render_overhead(self, *, rgb: bool = False, with_robot: bool) -> dict[str, Tensor]:
         self.agent.show(with_robot)
         try:
             self.scene.update_render(update_sensors=True, update_human_render_cameras=False)
             sensor = self._overhead_sensor
             sensor.capture()
-            images = sensor.get_obs(
-                rgb="rgb" in textures, depth="depth" in textures, position=False, segmentation=False
-            )
-            depth = images["depth"]
-            return images | {"depth": depth.where(depth < 0.99 * FAR, torch.nan)}
+            return sensor.get_obs(rgb=rgb, depth=True, position=False, segmentation=False)
         finally:
             self.agent.show(True)
 

@@ -31,6 +31,11 @@ def camera_config(overhead: Overhead, centre_xy: tuple[float, float]) -> CameraC
     )
 
 
+def where_seen(depth: torch.Tensor) -> torch.Tensor:
+    """Depth in metres, NaN where the camera sees nothing, such as beyond the table."""
+    return depth.where(depth < 0.99 * FAR, torch.nan)
+
+
 def without_reflection_table(camera: Camera) -> None:
     """Give a camera an empty table of the reflections of an environment, since there is no environment map.
 

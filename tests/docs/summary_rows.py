@@ -206,23 +206,29 @@ def _shipped_model(stored: StoredReport) -> list[SummaryRow]:
     ]
 
 
+def _errors(one: dict[str, Any]) -> str:
+    return f"{_mm(one['translation']['mean'])}, {_degrees(one['rotation']['mean'])}"
+
+
+def _error_intervals(one: dict[str, Any]) -> str:
+    translation, rotation = one["translation"]["interval"], one["rotation"]["interval"]
+    return f"{_between(translation, 1e3, 'mm')}, {_between(rotation, math.degrees(1), 'degrees')}"
+
+
 def _equal_recipes(stored: StoredReport) -> list[SummaryRow]:
     found = _report(stored)["scores"]["novel"]
-    ours, paper = found[OURS], found[PAPER_AS_OURS]
-
-    def errors(one: dict[str, Any]) -> str:
-        accuracy = f"{one['balanced_accuracy']['mean']:.1%} accurate"
-        return f"{accuracy}, {_mm(one['translation']['mean'])}, {_degrees(one['rotation']['mean'])}"
-
-    trained = _report(stored)["n"].partition(",")[0]  # "trained on ... attempts at ... parts"
-    text = f"{trained}, both by our recipe: ours {errors(ours)}; the paper's network {errors(paper)}"
-    interval = "; ".join(
-        f"{_between(one['balanced_accuracy']['interval'], 100, '%')}, "
-        f"{_between(one['translation']['interval'], 1e3, 'mm')}, "
-        f"{_between(one['rotation']['interval'], math.degrees(1), 'degrees')}"
-        for one in (ours, paper)
+    ours, paper = (
+        (one, f"{one['balanced_accuracy']['mean']:.1%} accurate, {_errors(one)}")
+        for one in (found[OURS], found[PAPER_AS_OURS])
     )
-    n = f"{ours['n']} grasps of {ours['parts']} parts, {ours['successes']} successes; three trainings each"
+    trained = _report(stored)["n"].partition(",")[0]  # "trained on ... attempts at ... parts"
+    text = f"{trained}, both by our recipe: ours {ours[1]}; the paper's network {paper[1]}"
+    interval = "; ".join(
+        f"{_between(one['balanced_accuracy']['interval'], 100, '%')}, {_error_intervals(one)}"
+        for one, _ in (ours, paper)
+    )
+    first = ours[0]
+    n = f"{first['n']} grasps of {first['parts']} parts, {first['successes']} successes; three trainings each"
     split = stored.facts["split"].partition(";")[0]
     return [SummaryRow(name="random grasps", text=text, interval=interval, split=split, n=n)]
 
@@ -233,48 +239,37 @@ def _paper_networks(stored: StoredReport) -> list[SummaryRow]:
         for name, one in _report(stored)["scores"]["novel"].items()
         if name == OURS or name.endswith(", our recipe")
     }
-    errors, intervals = (
-        "; ".join(
-            f"{name} {mm(one['translation'])}, {degrees(one['rotation'])}" for name, one in scores.items()
+    return [
+        SummaryRow(
+            name="random grasps, all networks",
+            text="displacement RMSE by our recipe: "
+            + "; ".join(f"{name} {_errors(one)}" for name, one in scores.items()),
+            interval="; ".join(f"{name} {_error_intervals(one)}" for name, one in scores.items()),
+            split=stored.facts["split"].partition(";")[0],
+            n=f"{scores[OURS]['successes']} successes of {scores[OURS]['parts']} parts; one training each",
         )
-        for mm, degrees in (
-            (lambda one: _mm(one["mean"]), lambda one: _degrees(one["mean"])),
-            (
-                lambda one: _between(one["interval"], 1e3, "mm"),
-                lambda one: _between(one["interval"], math.degrees(1), "degrees"),
-            ),
-        )
-    )
-    first = next(iter(scores.values()))
-    n = f"{first['successes']} successes of {first['parts']} parts; one training each"
-    split = stored.facts["split"].partition(";")[0]
-    text = f"displacement RMSE by our recipe: {errors}"
-    return [SummaryRow(name="random grasps, all networks", text=text, interval=intervals, split=split, n=n)]
+    ]
 
 
 def _displacement_networks(stored: StoredReport) -> list[SummaryRow]:
     models = _report(stored)["models"]
-    novel = {name: one for name, one in models.items() if one["quality"]["novel"]["trials"]}
 
     def row(name: str, policy: str) -> SummaryRow:
-        found = {model: one[policy]["novel"] for model, one in novel.items() if one[policy]}
+        # Without variances a network chooses none; LOWESS knows no novel part.
+        of = {model: one[policy]["novel"] for model, one in models.items() if one[policy]}
+        of = {model: one for model, one in of.items() if one["trials"]}
         return SummaryRow(
             name=name,
             text="displacement RMSE "
             + "; ".join(
                 f"{model} {_rmse(one)}, {one['within'][0]['value']:.1%} of all attempts off by at most 1 mm"
-                for model, one in found.items()
+                for model, one in of.items()
             ),
             interval="; ".join(
                 f"{_rmse_intervals(one)}, {_between(one['within'][0]['interval'], 100, '%')}"
-                for one in found.values()
+                for one in of.values()
             ),
-            n=" and ".join(
-                dict.fromkeys(
-                    f"{one['trials']} trials of {one['measured_parts']} parts" for one in found.values()
-                )
-            )
-            + " with each",
+            n=f"{of[OURS]['trials']} trials of {of[OURS]['measured_parts']} parts with each",
         )
 
     return [
