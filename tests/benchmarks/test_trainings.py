@@ -129,6 +129,9 @@ def test_a_folder_of_other_settings_or_attempts_is_refused(looks, sides, tmp_pat
     predicted = made_of.with_name("validation.npz")
     before = predicted.stat().st_mtime_ns
     made_of.write_text(json.dumps({name: known[name] for name in known if name != "validation grasps"}))
+    with pytest.raises(UsageError, match="training of other rows"):
+        made(looks, fewer, tmp_path, [OWN])
+    assert predicted.stat().st_mtime_ns == before  # what is refused is left alone
     made(looks, sides, tmp_path, [OWN])  # nobody knows of which grasps: they are predicted again
     assert predicted.stat().st_mtime_ns > before and json.loads(made_of.read_text()) == known
     some = {"validation": sides.validation[::2]}

@@ -265,11 +265,11 @@ def _check_origin(folder: Path, origin: dict[str, Any]) -> None:
     path = folder / _MADE_OF
     if path.exists():
         before = json.loads(path.read_text(encoding="utf-8"))
-        for name in origin.keys() - before.keys():  # predicted for rows that are not known: predicted again
-            (folder / f"{name.removesuffix(' grasps')}.npz").unlink(missing_ok=True)
         if changed := [name for name, value in origin.items() if before.get(name, value) != value]:
             raise UsageError(
                 f"{folder} holds a training of other {' and '.join(changed)}; choose another --out"
             )
+        for name in origin.keys() - before.keys():  # predicted for rows that are not known: predicted again
+            (folder / f"{name.removesuffix(' grasps')}.npz").unlink(missing_ok=True)
         origin = before | origin
     write_whole(path, (json.dumps(origin, indent=1) + "\n").encode())
