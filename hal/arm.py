@@ -341,6 +341,17 @@ class Arm(Device):
         """
         self._check_pose(self.limits, T_base_tcp)
 
+    def legs(self, T_base_tcp: Pose) -> list[Pose]:
+        """Ends of the straight motions by which `move_to_pose` would go to a pose from here, the pose last.
+
+        Most arms go there by one. Nothing moves.
+
+        Raises:
+            NotConnected, CommunicationLost: The arm is not connected or does not answer.
+        """
+        self._require_connection()
+        return self._legs(T_base_tcp)
+
     def check_joints(self, joints: np.ndarray) -> None:
         """Refuse a target of (n,) radians outside its limits or the workspace, or too near to something.
 

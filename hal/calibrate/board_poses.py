@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -100,11 +101,15 @@ def in_sight(outline: np.ndarray, T_base_board: Pose, sight: Sight) -> bool:
     return bool(facing > 0 and (pixels > _EDGE_PX).all() and (pixels < limit).all())
 
 
-def way_is_clear(start: Pose, goal: Pose, T_tcp_board: Pose, board: Board, table_z: float) -> bool:
-    """Whether the board stays off the table while the hand moves straight from start to goal."""
-    line = straight_line(start, goal, np.linspace(0, 1, 9))
-    hands = (Pose(position=p, quat_wxyz=q) for p, q in zip(line.position, line.quat_wxyz, strict=True))
-    return all(_lowest(board.outline(), hand @ T_tcp_board) >= table_z + TABLE_MARGIN / 2 for hand in hands)
+def way_is_clear(stops: Sequence[Pose], T_tcp_board: Pose, board: Board, table_z: float) -> bool:
+    """Whether the board stays off the table while the hand moves straight from each stop to the next."""
+    for start, goal in pairwise(stops):
+        line = straight_line(start, goal, np.linspace(0, 1, 9))
+        for position, quat_wxyz in zip(line.position, line.quat_wxyz, strict=True):
+            T_base_board = Pose(position=position, quat_wxyz=quat_wxyz) @ T_tcp_board
+            if _lowest(board.outline(), T_base_board) < table_z + TABLE_MARGIN / 2:
+                return False
+    return True
 
 
 def _lowest(outline: np.ndarray, T_base_board: Pose) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,15 +145,25 @@ def take_pictures(
     )
     taken = found = 0
     first: list[Picture] = []
-    here = start
+
+    def clear(target: Pose) -> bool:
+        # As the arm gets there, which may be by a turn in place: low over the table the board has no room.
+        stops = [arm.state().T_base_tcp, *arm.legs(target)]
+        return way_is_clear(stops, T_tcp_board, board, table_z)
+
+    def bring_back() -> None:
+        if not clear(start):
+            return  # a person takes the board where it is
+        with contextlib.suppress(OutOfWorkspace):  # no straight path there
+            arm.move_to_pose(start, speed=speed)
+
     for target in targets:
-        if not way_is_clear(here, target, T_tcp_board, board, table_z):
+        if not clear(target):
             continue
         try:
             arm.move_to_pose(target, speed=speed)
         except OutOfWorkspace:
             continue  # no straight path there: refused before anything moved
-        here = target
         arm.wait(settle_s)
         picture = _still_picture(cell)
         n_corners = len(detect(board, picture.sighted).ids)
@@ -162,7 +173,7 @@ def take_pictures(
         if found == 0:
             first.append(picture)
         if found == 0 and taken == _HOPELESS:
-            _bring_back(cell, start, speed)
+            bring_back()
             refuse_invisible(board, first)
             image = "pictures" if picture.infrared is None else "infrared images"
             raise BadCalibrationSet(
@@ -171,7 +182,7 @@ def take_pictures(
             )
         if found == n or taken == _SPARE * n:
             break
-    _bring_back(cell, start, speed)
+    bring_back()
     if taken == 0 or found < MIN_VIEWS:
         raise BadCalibrationSet(
             f"the arm could bring the board before the camera {taken} times and it was found {found} times, "
@@ -179,13 +190,6 @@ def take_pictures(
             "workspace's box, --nearest and --board-at"
         )
     return taken
-
-
-def _bring_back(cell: Cell, start: Pose, speed: float) -> None:
-    try:
-        cell.arm.move_to_pose(start, speed=speed)
-    except OutOfWorkspace:
-        pass  # no straight path there: a person takes the board where it is
 
 
 def _possible(cell: Cell) -> Callable[[Pose], bool]:

@@ -159,6 +159,10 @@ class RecordingArm(SharingDevice, Arm):
         """See `Arm.check_joints`; not recorded, since a replayed cell is not checked."""
         self._arm.check_joints(joints)
 
+    def legs(self, T_base_tcp: Pose) -> list[Pose]:
+        """See `Arm.legs`; not recorded."""
+        return self._arm.legs(T_base_tcp)
+
     def _record(self, call: str, **arguments: Any) -> Any:
         return self._writer.call(
             call, arguments, lambda: getattr(self._arm, call)(**arguments), after=self._after

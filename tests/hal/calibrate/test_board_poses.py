@@ -138,8 +138,8 @@ def test_a_way_that_dips_the_board_to_the_table_is_not_clear():
         return Pose(position=np.array([0.5, 0.0, z]), quat_wxyz=turn)
 
     margin = TABLE_Z + TABLE_MARGIN / 2
-    assert way_is_clear(at(margin + 0.001, 0), at(margin + 0.1, 0), straight, BOARD, TABLE_Z)
-    assert not way_is_clear(at(margin - 0.001, 0), at(margin + 0.1, 0), straight, BOARD, TABLE_Z)
+    assert way_is_clear([at(margin + 0.001, 0), at(margin + 0.1, 0)], straight, BOARD, TABLE_Z)
+    assert not way_is_clear([at(margin - 0.001, 0), at(margin + 0.1, 0)], straight, BOARD, TABLE_Z)
     # From 60 degrees to 120: at both ends the lower edge is 80 mm * sin 60 down, upright 80 mm.
     for z, clear in ((0.081, True), (0.075, False)):
-        assert way_is_clear(at(margin + z, 60), at(margin + z, 120), straight, BOARD, TABLE_Z) is clear
+        assert way_is_clear([at(margin + z, 60), at(margin + z, 120)], straight, BOARD, TABLE_Z) is clear

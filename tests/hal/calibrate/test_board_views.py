@@ -23,7 +23,7 @@ from hal.calibrate.config import CalibrateConfig
 from hal.calibrate.hand_eye import BadCalibrationSet, solve_hand_eye
 from hal.errors import MotionAborted, OutOfWorkspace
 from mskgrasp.core.errors import UsageError
-from mskgrasp.core.geometry import Pose, pose_distance
+from mskgrasp.core.geometry import Pose, pose_distance, straight_line
 from tests.hal.calibrate.toy_bench import BOARD, HELD, OVERHEAD, bench
 
 N = 8
@@ -51,6 +51,28 @@ def test_as_many_pictures_as_asked_for_are_taken_and_the_hand_returns():
     assert sum(n >= 6 for n in found) == N and n_taken == len(kept) < 2 * N
     assert [number for number, _, _ in kept] == list(range(n_taken))
     assert pose_distance(cell.arm.state().T_base_tcp, start) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_an_arm_that_turns_in_place_first_keeps_the_board_off_the_table(monkeypatch: pytest.MonkeyPatch):
+    cell = bench()
+    low = Pose(position=np.array([0.5, 0.0, 0.06]), quat_wxyz=np.array([0.0, 1.0, 0.0, 0.0]))
+    cell.arm.move_to_pose(low)
+    went: list[float] = []
+    move = cell.arm._move_to_pose
+
+    def legs(goal: Pose) -> list[Pose]:
+        here = cell.arm._state().T_base_tcp
+        return [Pose(position=here.position, quat_wxyz=goal.quat_wxyz), goal]
+
+    def moved(goal: Pose, speed: float) -> None:
+        line = straight_line(cell.arm._state().T_base_tcp, goal, np.linspace(0, 1, 21))
+        went.extend((line[k] @ HELD).apply(BOARD.outline())[:, 2].min() for k in range(21))
+        move(goal, speed)
+
+    monkeypatch.setattr(cell.arm, "_legs", legs)
+    monkeypatch.setattr(cell.arm, "_move_to_pose", moved)
+    n_taken, _ = take(cell, n=24)
+    assert n_taken >= 24 and min(went) > 0.015
 
 
 def test_the_pictures_give_the_camera(taken: list[tuple[int, Picture, int]]):

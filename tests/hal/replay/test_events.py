@@ -85,6 +85,6 @@ def test_every_command_is_a_method_of_a_device_and_every_motion_of_an_arm_a_comm
     }
     assert set(COMMANDS) <= methods
     queries = {"state", "in_hand", "check_pose", "part_pose", "stop", "connect", "close"}
-    queries |= {"check_joints", "check_load", "hand", "holds"}
+    queries |= {"check_joints", "check_load", "hand", "holds", "legs"}
     queries |= {"set_load", "slow_down"}  # move nothing: a recording without them accepts one
     assert methods - queries == set(COMMANDS)
