@@ -169,7 +169,7 @@ class Operator:
     def _ask(self, question: str, legal: dict[str, bool]) -> bool:
         while True:
             word = self._line(question)
-            answer = legal.get(word if word != "yes" else "y")
+            answer = legal.get({"yes": "y", "no": "n"}.get(word, word))
             if answer is not None:
                 return answer
             self.inform(f"{word!r} is no valid answer.")

@@ -129,7 +129,7 @@ def test_what_was_typed_before_a_question_does_not_answer_it(real):
 
 
 def test_a_question_is_answered_by_yes_or_no_and_not_asked_on_a_simulated_cell(real):
-    asked, prompts = operator(real, "maybe\nn\ny\n")
+    asked, prompts = operator(real, "maybe\nNo\nyes\n")
     assert not asked.confirm("Write it? ") and asked.confirm("Write it? ")
     assert prompts.getvalue().count("Write it?") == 3
     assert Operator(cell_from_yaml(SIMULATED)).confirm("Write it? ")

@@ -24,6 +24,7 @@ from hal.errors import CaptureFailed
 from mskgrasp.core.geometry import Pose
 from tests.hal.flat_table import DOWN, WORKSPACE, frame_of_table
 from tests.hal.franka.robots import arm_at, fci5
+from tests.hal.replay.toy import ToyArm
 
 
 @pytest.mark.parametrize(
@@ -185,3 +186,16 @@ def test_a_part_in_the_hand_is_not_dropped(tmp_path: Path):
             robot.order("part 0")
             arm.open_gripper()
             assert [finding.level for finding in check_motion(arm)] == ["ok", "ok"]
+
+
+@pytest.mark.parametrize("widest", [0.0803, 0.0791])
+def test_a_hand_that_opens_by_some_tenths_more_or_less_than_its_datasheet_is_no_fault(
+    monkeypatch: pytest.MonkeyPatch, widest: float
+):
+    arm = ToyArm()
+    state = arm._state
+    monkeypatch.setattr(arm, "_known_width", lambda: widest)
+    monkeypatch.setattr(arm, "_state", lambda: dataclasses.replace(state(), max_width=widest))
+    with arm:
+        _, hand = check_motion(arm)
+    assert hand.level == "ok" and f"{1e3 * widest:.1f} mm: within 0.00 mm" in hand.text
