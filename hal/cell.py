@@ -55,10 +55,14 @@ class Workspace:
         """
         return self.clearance + PAD_CORNER * float(np.linalg.norm(self.table_slope))
 
-    def lowest_grasp_z(self, xy: np.ndarray) -> np.ndarray:
-        """Least z (...) of grasps at points (..., 2) whose pads keep clear of the table, metres."""
+    def lowest_tip_z(self, xy: np.ndarray) -> np.ndarray:
+        """Least z (...) of the pads' tips at points (..., 2) over the table, metres."""
         table = plane_height(xy, self.table_z, self.table_slope, self.centre)
-        return table + PAD_REACH + self.pads_clearance
+        return table + self.pads_clearance
+
+    def lowest_grasp_z(self, xy: np.ndarray) -> np.ndarray:
+        """Least z (...) of grasps of the Franka Hand at points (..., 2) that keep clear of the table, m."""
+        return self.lowest_tip_z(xy) + PAD_REACH
 
 
 class PartFeeder(Protocol):

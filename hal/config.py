@@ -30,7 +30,9 @@ def _measured(value: Any) -> Any:
     return value
 
 
-Slope = Annotated[float, Field(ge=-0.05, le=0.05)]
+STEEPEST = 0.05
+"""Greatest rise of a table along x and along y, m a metre."""
+Slope = Annotated[float, Field(ge=-STEEPEST, le=STEEPEST)]
 
 
 class MeasuredGrip(Config):

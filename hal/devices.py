@@ -140,7 +140,7 @@ def out_of_reach(arm: Arm, workspace: Workspace) -> str | None:
     """
     x_min, x_max, y_min, y_max = workspace.region
     for x, y in itertools.product(np.linspace(x_min, x_max, 3), np.linspace(y_min, y_max, 3)):
-        lowest = float(workspace.lowest_grasp_z(np.array([x, y])))
+        lowest = float(workspace.lowest_tip_z(np.array([x, y]))) + arm.limits.gripper.pad_reach
         for z in (lowest, lowest + workspace.lift_height, workspace.table_z + APPROACH):
             for theta in (-np.pi / 2, 0.0, np.pi / 2):
                 try:

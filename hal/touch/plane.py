@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hal.config import STEEPEST
 from mskgrasp.core.errors import MskgraspError
 
 TILT_MATTERS = 0.0005
@@ -13,7 +14,7 @@ TILT_MATTERS = 0.0005
 
 
 class NoPlane(MskgraspError):
-    """The touched points lie on no plane."""
+    """The touched points lie on no plane, or on too steep a one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +53,7 @@ def fit_plane(points: np.ndarray, region: tuple[float, float, float, float], fla
         flatness: Greatest distance of a point from the plane, metres.
 
     Raises:
-        NoPlane: A point is farther from the plane.
+        NoPlane: A point is farther from the plane, or it is steeper than a cell's table may be.
     """
     x_min, x_max, y_min, y_max = region
     centre = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
@@ -68,6 +69,11 @@ def fit_plane(points: np.ndarray, region: tuple[float, float, float, float], fla
         raise NoPlane(
             f"the {len(points)} touches fit no plane: {shown}; {1e3 * flatness:g} mm are accepted "
             "(--flatness). Remove what lies on the table, or level a warped one, and touch it again"
+        )
+    if max(abs(slope_x), abs(slope_y)) > STEEPEST:
+        raise NoPlane(
+            f"the touched table rises by {1e3 * slope_x:.0f} mm a metre along x and {1e3 * slope_y:.0f} along "
+            f"y; at most {1e3 * STEEPEST:g} either way are possible. Level it, or clear what the fingers met"
         )
     half = np.array([x_max - x_min, y_max - y_min]) / 2
     return TouchedPlane(

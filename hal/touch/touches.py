@@ -11,12 +11,13 @@ from hal.arm import Arm
 from hal.cell import Cell, Workspace
 from hal.errors import HalError
 from hal.execute import APPROACH, go_home
+from hal.limits import plane_height
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import PAD_REACH, pose_base_tcp
+from mskgrasp.core.grasp import pose_base_tcp
 
 N_POINTS = 5
 ABOVE = 0.02
-"""Distance of the pads from the table as the hand moves from one point to the next, metres."""
+"""Distance of the pads from the table, beyond the clearance, as the hand moves between points, metres."""
 BELOW = 0.015
 """Depth under the first contact down to which the table is searched at the other points, metres."""
 PART_ROOM = 0.08
@@ -77,17 +78,19 @@ def touch_table(
     places = touch_points(workspace.region, part)
     go_home(cell)
     arm.move_gripper(0.0)
-    arm.move_to_pose(_above(places[0], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
+    arm.move_to_pose(_above(arm, places[0], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
     first = _touch(arm, places[0], workspace.table_z - search, force, 2 * speed)
     if (fault := _fault_of_first(first, places[0], workspace, search)) is not None:
         _retreat(arm, workspace, fault)
     assert first is not None
-    travel = max(first[2], workspace.table_z) + ABOVE
+    stated = plane_height(places, workspace.table_z, workspace.table_slope, workspace.centre)
+    # The arm keeps the clearance from the table where it is stated, too.
+    travel = max(first[2], stated.max()) + workspace.clearance + ABOVE
     points = []
     for number, place in enumerate(places):
         here = arm.state().T_base_tcp.position
-        arm.move_to_pose(_above(here[:2], travel), speed=_TRAVEL_SPEED)
-        arm.move_to_pose(_above(place, travel), speed=_TRAVEL_SPEED)
+        arm.move_to_pose(_above(arm, here[:2], travel), speed=_TRAVEL_SPEED)
+        arm.move_to_pose(_above(arm, place, travel), speed=_TRAVEL_SPEED)
         point = _touch(arm, place, first[2] - BELOW, force, speed)
         if (fault := _fault_of_later(point, place, first[2], workspace.table_z + search)) is not None:
             _retreat(arm, workspace, fault)
@@ -95,20 +98,20 @@ def touch_table(
         touched(number, point)
         points.append(point)
     # Going home opens the fingers first, which must not press on the table then.
-    arm.move_to_pose(_above(places[-1], travel), speed=_TRAVEL_SPEED)
+    arm.move_to_pose(_above(arm, places[-1], travel), speed=_TRAVEL_SPEED)
     go_home(cell)
     return np.array(points)
 
 
-def _above(xy: np.ndarray, z: float) -> Pose:
+def _above(arm: Arm, xy: np.ndarray, z: float) -> Pose:
     """Pose of a hand that points down with the tips of its pads at a height."""
-    return pose_base_tcp(np.array([*xy, z + PAD_REACH, 0.0]))
+    return pose_base_tcp(np.array([*xy, z + arm.limits.gripper.pad_reach, 0.0]))
 
 
 def _touch(arm: Arm, xy: np.ndarray, lowest: float, force: float, speed: float) -> np.ndarray | None:
     """(3,) point where the pads touch the table; None if they reach a height without."""
-    contact = arm.move_until_contact(_above(xy, lowest), force=force, speed=speed)
-    return None if contact is None else contact.apply(np.array([0.0, 0.0, PAD_REACH]))
+    contact = arm.move_until_contact(_above(arm, xy, lowest), force=force, speed=speed)
+    return None if contact is None else contact.apply(np.array([0.0, 0.0, arm.limits.gripper.pad_reach]))
 
 
 def _retreat(arm: Arm, workspace: Workspace, fault: str) -> NoReturn:
@@ -121,7 +124,7 @@ def _retreat(arm: Arm, workspace: Workspace, fault: str) -> NoReturn:
     error = TableNotFound(fault)
     here = arm.state().T_base_tcp.position
     try:
-        arm.move_to_pose(_above(here[:2], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
+        arm.move_to_pose(_above(arm, here[:2], workspace.table_z + APPROACH), speed=_TRAVEL_SPEED)
     except HalError as stuck:
         raise stuck from error
     raise error

@@ -10,9 +10,9 @@ import numpy as np
 import yaml
 
 from hal import ArmLimits, Cell
+from hal.gripper import FRANKA_HAND
 from hal.limits import plane_height
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import PAD_REACH
 from tests.hal.replay.toy import ToyArm, toy_cell
 
 CELLS = Path(__file__).parents[3] / "configs" / "cells"
@@ -29,20 +29,25 @@ class FeelingArm(ToyArm):
         self.forces: list[float] = []
         self.speeds: list[float] = []
 
+    @property
+    def reach(self) -> float:
+        """Reach of the pads beyond the TCP, metres."""
+        return self.limits.gripper.pad_reach
+
     def _move_to_pose(self, T_base_tcp: Pose, speed: float) -> None:
         position = T_base_tcp.position
-        assert position[2] - PAD_REACH > self._height(position[:2]), "pressed into the table"
+        assert position[2] - self.reach > self._height(position[:2]), "pressed into the table"
         self._joints = np.concatenate([position, np.zeros(4)])
         self._quat_wxyz = T_base_tcp.quat_wxyz
 
     def _move_gripper(self, width: float) -> None:
         position = self._joints[:3]
-        assert position[2] - PAD_REACH > self._height(position[:2]), "fingers moved on the table"
+        assert position[2] - self.reach > self._height(position[:2]), "fingers moved on the table"
         super()._move_gripper(width)
 
     def _move_until_contact(self, T_base_tcp: Pose, force: float, speed: float) -> Pose | None:
         position = np.array(T_base_tcp.position)
-        touched = self._height(position[:2]) + PAD_REACH
+        touched = self._height(position[:2]) + self.reach
         met = touched > position[2]
         position[2] = max(position[2], touched)
         self._joints, self._quat_wxyz = np.concatenate([position, np.zeros(4)]), T_base_tcp.quat_wxyz
@@ -51,7 +56,14 @@ class FeelingArm(ToyArm):
         return Pose(position=position, quat_wxyz=T_base_tcp.quat_wxyz) if met else None
 
 
-def feeling_cell(height: Callable[[np.ndarray], float], *, table_z: float = 0.0) -> Cell:
+def feeling_cell(
+    height: Callable[[np.ndarray], float],
+    *,
+    table_z: float = 0.0,
+    table_slope: tuple[float, float] = (0.0, 0.0),
+    clearance: float = 0.003,
+    pad_reach: float = FRANKA_HAND.pad_reach,
+) -> Cell:
     """A cell with a `FeelingArm` over a table of a height at points (2,), stated at ``table_z``."""
     cell = toy_cell()
     ones = np.ones(7)
@@ -62,10 +74,18 @@ def feeling_cell(height: Callable[[np.ndarray], float], *, table_z: float = 0.0)
         box_upper=np.array([0.8, 0.4, 0.8]),
         table_z=table_z,
         max_force=70.0,
-        clearance=0.003,
+        clearance=clearance,
+        table_slope=np.array(table_slope),
+        table_centre=np.array([0.5, 0.0]),
+        gripper=replace(FRANKA_HAND, pad_reach=pad_reach),
     )
     workspace = replace(
-        cell.workspace, table_z=table_z, region=REGION, home=np.array([0.4, 0.0, 0.5, 0, 0, 0, 0])
+        cell.workspace,
+        table_z=table_z,
+        table_slope=table_slope,
+        clearance=clearance,
+        region=REGION,
+        home=np.array([0.4, 0.0, 0.5, 0, 0, 0, 0]),
     )
     return replace(cell, arm=FeelingArm(height, limits), workspace=workspace, tracker=None)
 

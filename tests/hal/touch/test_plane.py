@@ -28,6 +28,13 @@ def test_a_tilt_of_less_than_half_a_millimetre_does_not_matter():
     assert not fit_plane(points(0.1, (0.0025, 0.002)), REGION, 5e-4).level
 
 
+@pytest.mark.parametrize("slope", [(0.055, 0.0), (0.0, -0.055)])
+def test_a_table_steeper_than_a_cell_may_state_is_refused(slope: tuple[float, float]):
+    assert fit_plane(points(0.0, (0.0499, -0.0499)), REGION, 5e-4).slope[0] == pytest.approx(0.0499)
+    with pytest.raises(NoPlane, match="rises by .*55.* along y; at most 50 either way.* Level it"):
+        fit_plane(points(0.0, slope), REGION, 5e-4)
+
+
 @pytest.mark.parametrize("number", range(5))
 def test_one_touch_of_something_2_mm_high_fits_no_plane(number: int):
     found = points(0.01, (0.007, 0.0))

@@ -14,7 +14,7 @@ from mskgrasp.core.grasp import PAD_REACH
 from tests.hal.touch.tables import REGION, FeelingArm, feeling_cell, tilted
 
 
-def touches(height: Callable[[np.ndarray], float], **settings: float) -> np.ndarray:
+def touches(height: Callable[[np.ndarray], float], **settings: Any) -> np.ndarray:
     cell = feeling_cell(height, **settings)
     with cell.arm:
         return touch_table(cell, search=0.03, force=5.0, speed=0.01)
@@ -39,6 +39,22 @@ def test_a_table_anywhere_within_the_search_is_touched_where_it_is(table_z: floa
     height = tilted(table_z + off, (0.008, -0.004) if off == 0 else (0.0, 0.0))
     points = touches(height, table_z=table_z)
     assert points[:, 2] == pytest.approx([height(point[:2]) for point in points], abs=1e-9)
+
+
+@pytest.mark.parametrize("pad_reach", [0.005, 0.02])
+def test_pads_of_any_length_find_the_table_where_it_is(pad_reach: float):
+    height = tilted(0.012, (0.004, 0.0))
+    points = touches(height, pad_reach=pad_reach)
+    assert points[:, 2] == pytest.approx([height(point[:2]) for point in points], abs=1e-9)
+
+
+@pytest.mark.parametrize("slope", [(0.0, 0.0), (0.02, -0.02)])
+@pytest.mark.parametrize("off", [0.0, -0.028])
+def test_a_table_is_touched_whatever_clearance_and_slope_the_file_states(
+    slope: tuple[float, float], off: float
+):
+    points = touches(tilted(off, (0.0, 0.0)), table_slope=slope, clearance=0.05)
+    assert points[:, 2] == pytest.approx(np.full(5, off), abs=1e-9)
 
 
 def test_the_first_contact_is_made_twice_as_fast_and_none_with_another_force():
