@@ -80,6 +80,8 @@ class FrankaArm(Arm):
             self._link = self._new_link()
             self._load = None
             self._was_idle = False
+            # The fingers may have been moved since this object was closed.
+            self._held, self._moved_fingers = None, False
 
     def _new_link(self) -> DriverLink:
         config = self._config

@@ -203,3 +203,17 @@ def test_a_slowed_arm_keeps_a_share_of_the_speeds_of_its_file(tmp_path: Path, mo
 
     for asked in (0.05, 1.0):
         assert fastest(0.1, asked) == pytest.approx(np.multiply(0.1, fastest(1.0, asked)), rel=0.02)
+
+
+def test_an_arm_that_is_opened_again_asks_the_hand_what_it_holds(tmp_path: Path):
+    with fci5() as robot:
+        arm = arm_at(tmp_path, "panda_py", robot.host)
+        with arm:
+            arm.open_gripper()
+            assert arm.in_hand() is None
+        robot.order("part 0.03")
+        with arm_at(tmp_path, "panda_py", robot.host) as other:
+            assert other.grasp(20.0).holding
+        with arm:
+            held = arm.in_hand()
+            assert held is not None and held.T_base_tcp is None
