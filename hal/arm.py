@@ -273,6 +273,11 @@ class Arm(Device):
         open_ = state.gripper_width > state.max_width - WIDTH_TOLERANCE
         return None if open_ or not state.grasped else Held(T_base_tcp=None, width=state.gripper_width)
 
+    @property
+    def may_drop(self) -> bool:
+        """Whether what the hand holds may fall without harm: a simulated part, or a replay of one."""
+        return self.simulated
+
     def holds(self, state: ArmState) -> bool:
         """Whether the fingers hold something in a state, by the rule `hal.hand.holds`."""
         return holds(state.gripper_width, state.grasped, self.limits.closed_width)

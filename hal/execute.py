@@ -13,7 +13,7 @@ from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, OutOfWorkspace, Stopped
 from hal.hand import Load
 from mskgrasp.core.geometry import Pose
-from mskgrasp.core.grasp import HOLD_S, PAD_REACH, SAME_HAND, Grasp
+from mskgrasp.core.grasp import HOLD_S, SAME_HAND, Grasp
 
 APPROACH = 0.12
 """Least height over the table from which the straight descent begins, m; tall things raise it."""
@@ -124,14 +124,16 @@ def refuse_by_hand(cell: Cell) -> None:
         )
 
 
-def clear_height(cell: Cell, tallest: float, *, below: float = PAD_REACH) -> float:
+def clear_height(cell: Cell, tallest: float, *, below: float | None = None) -> float:
     """Height of the TCP at which the hand passes over everything on the table, base frame, metres.
 
     Args:
         cell: The cell.
         tallest: Height of the tallest thing over the table, metres.
-        below: Distance by which pads, or a part in the hand, reach below the TCP, metres.
+        below: Distance by which a part in the hand reaches below the TCP, metres; None: the pads do.
     """
+    if below is None:
+        below = cell.arm.limits.gripper.pad_reach
     return cell.workspace.table_z + max(APPROACH, tallest + below + OVER)
 
 
@@ -241,12 +243,12 @@ def go_home(cell: Cell, *, tallest: float = 0.0, take: Callable[[], bool] | None
                     "the hand has held something since an earlier program, which would fall from an unknown "
                     "height: hold it, run python -m hal.home, which opens the fingers, then start again"
                 )
-        elif take is None and not arm.simulated:
+        elif take is None and not arm.may_drop:
             raise HandFull(
                 "the hand holds something, which would fall: put it down (hal.put_down), or take it and open "
                 "the fingers (arm.open_gripper), then go home"
             )
-        elif arm.simulated or take is None or not take():
+        elif arm.may_drop or take is None or not take():
             _put_down_below(cell, float(held.T_base_tcp.position[2]))
     arm.open_gripper()
     state = arm.state()
@@ -275,7 +277,7 @@ def _put_down_below(cell: Cell, grasped: float) -> None:
     except Stopped:
         raise
     except OutOfWorkspace:
-        if not cell.arm.simulated:  # only a simulated part may fall
+        if not cell.arm.may_drop:
             raise
     except MotionAborted:
         cell.arm.recover()  # it stands on what it met

@@ -47,6 +47,11 @@ class ReplayArm(SharingDevice, Arm):
         # The fault is this program's, not the recorded one's: what acknowledges it was not recorded, either.
         self._astray = False
 
+    @property
+    def may_drop(self) -> bool:
+        """Whether the recorded arm was simulated."""
+        return self._playback.recording.simulated
+
     def connect(self) -> None:
         """Go to the beginning of the recording."""
         if not self._open:

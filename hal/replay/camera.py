@@ -28,6 +28,11 @@ class ReplayCamera(SharingDevice, Camera):
             read_recording(config.recording), ("capture",), loop=config.loop
         )
 
+    @property
+    def by_hand(self) -> bool:
+        """Whether the recorded camera's pose was measured by hand."""
+        return self._playback.recording.by_hand
+
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """The next recorded frame, at once; its time is that of this call, so that it counts as fresh.
 

@@ -31,6 +31,8 @@ class Recording:
         limits: The arm's limits.
         events: All calls, in the order in which they ended.
         n_frames: Number of frames.
+        simulated: The arm was simulated.
+        by_hand: The camera's pose was measured by hand, as in `Camera.by_hand`.
     """
 
     path: Path
@@ -39,6 +41,8 @@ class Recording:
     limits: ArmLimits
     events: tuple[Event, ...]
     n_frames: int
+    simulated: bool
+    by_hand: bool
 
     def frame(self, index: int, timestamp_s: float) -> RgbdFrame:
         """A frame, as if it had been exposed at ``timestamp_s``.
@@ -113,6 +117,9 @@ def _read(path: Path, file: Any) -> Recording:
         limits=ArmLimits(**limits, keep_out=keep_out, gripper=GripperSpec(**gripper)),
         events=events,
         n_frames=n_frames,
+        # A recording made before these were stored plays as one of a simulated, calibrated cell.
+        simulated=bool(file.attrs.get("simulated", True)),
+        by_hand=bool(file["frames"].attrs.get("by_hand", False)) if n_frames else False,
     )
 
 

@@ -33,7 +33,7 @@ class RecordingWriter:
     Args:
         path: The recording; must not exist yet.
         workspace: The table of the recorded cell.
-        arm: The recorded arm; its limits are stored.
+        arm: The recorded arm; its limits are stored, and whether it is simulated.
 
     Raises:
         UsageError: The file exists, or its folder cannot be written.
@@ -49,6 +49,7 @@ class RecordingWriter:
             )
         self._table = {key: plain(value) for key, value in asdict(workspace).items()}
         self._limits = {key: plain(value) for key, value in vars(arm.limits).items()}
+        self._simulated = arm.simulated
         self._lock = threading.Lock()
         self._users = 0
         self._file: h5py.File | None = None
@@ -85,6 +86,7 @@ class RecordingWriter:
                 units="metres, radians, newtons, seconds; poses x y z qw qx qy qz in the base frame",
                 workspace=json.dumps(self._table),
                 limits=json.dumps(self._limits),
+                simulated=self._simulated,
             )
             self._file.create_dataset("events", (0,), h5py.string_dtype(), maxshape=(None,), chunks=(64,))
             self._file.flush()
@@ -151,8 +153,8 @@ class RecordingWriter:
                 )
             )
 
-    def frame(self, frame: RgbdFrame) -> int:
-        """Store a frame and return its index.
+    def frame(self, frame: RgbdFrame, *, by_hand: bool = False) -> int:
+        """Store a frame and return its index; ``by_hand`` as in `Camera.by_hand`.
 
         Raises:
             OSError: The disk is nearly full; what was recorded until then is kept.
@@ -172,7 +174,7 @@ class RecordingWriter:
             )
             group = self._file.require_group("frames")
             if not group.keys():
-                group.attrs["serial"] = frame.serial
+                group.attrs.update(serial=frame.serial, by_hand=by_hand)
                 for key, value in values.items():
                     array = np.asarray(value)
                     packed: dict[str, Any] = dict(compression="gzip", compression_opts=1, shuffle=True)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from hal import Cell, cell_from_yaml
-from hal.errors import MissingRecording
+from hal import Cell, cell_from_yaml, execute_grasp, go_home
+from hal.errors import HandFull, MissingRecording, NotCalibrated
 from hal.replay import recorded_cell
 from mskgrasp.core.errors import BadConfig
+from mskgrasp.core.grasp import Grasp
 from tests.hal.replay.program import replayed, run_on
-from tests.hal.replay.toy import toy_cell
+from tests.hal.replay.toy import ToyArm, ToyCamera, toy_cell
 
 
 def test_the_same_program_gets_the_same_answers(recording: Path, tmp_path: Path):
@@ -27,6 +29,27 @@ def test_the_same_program_gets_the_same_answers(recording: Path, tmp_path: Path)
         assert json.dumps(played) == json.dumps(live)  # NaN compares as text
     assert cell.workspace.region == (0.3, 0.6, -0.1, 0.1)
     assert cell.arm.limits.max_force == 70.0
+
+
+def test_what_a_program_was_refused_it_is_refused_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A camera measured by hand, and a real hand that holds something."""
+    grasp = Grasp(position=np.array([0.45, 0.0, 0.08]), theta=np.array(0.0))
+
+    def refused(cell: Cell) -> type[Exception]:
+        with cell.connected():
+            cell.camera.capture()
+            with pytest.raises((NotCalibrated, HandFull)) as caught:
+                execute_grasp(cell, grasp)
+                go_home(cell)
+        return caught.type
+
+    for name, device, attribute, value in (
+        ("hand.h5", ToyArm, "simulated", False),
+        ("camera.h5", ToyCamera, "by_hand", True),
+    ):
+        monkeypatch.setattr(device, attribute, value)
+        live = refused(recorded_cell(toy_cell(), tmp_path / name))
+        assert refused(replayed(tmp_path / name)) is live
 
 
 def test_cell_files_of_recordings_are_checked(recording: Path, tmp_path: Path):
