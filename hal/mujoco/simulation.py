@@ -46,6 +46,7 @@ _BLOCK = 8
 _REST_SPEED = (1e-3, 1e-2)
 """A part slower than this is at rest, m/s and rad/s."""
 _REST_S = 0.06
+"""Time for which it must have been: a part that rocks stands still at each turning point."""
 _SETTLING_S = 2.0
 """Time that parts have to come to rest after they were placed, s."""
 
@@ -116,6 +117,7 @@ class Simulation:
         self.watch: Callable[[], None] | None = None
         """Called every `WATCH_S`; None: nothing is."""
         self._unwatched = 0
+        self._steps = self._quiet = 0
         self._settle()
 
     @property
@@ -200,9 +202,11 @@ class Simulation:
         """
         self.force = force
         limit = MOVE_FORCE if force is None else force
+        # Fingers that hold something stand where it is, not where they press.
+        lag = float(self.model.actuator_forcerange[7, 1]) / FINGER_STIFFNESS
+        start = min(max(self._opening, self.width - lag), self.width + lag)
         self._limit_fingers(limit)
-        speed, still = 2 * self.physics.finger_speed, np.zeros(7)
-        start, way = self._opening, width - self._opening
+        speed, still, way = 2 * self.physics.finger_speed, np.zeros(7), width - start
         n_ramp = math.ceil(abs(way) / speed / self.step_s)
         every, before, quiet = self.n_steps(FINGER_CHECK_S), self.width, 0
         for k in range(1, n_ramp + self.n_steps(FINGER_TIMEOUT_S) + 1):
@@ -299,6 +303,9 @@ class Simulation:
         data.ctrl[7] = self._opening
         mujoco.mj_step2(model, data)
         self._measure_force()
+        self._steps += 1
+        if self._steps % _BLOCK == 0:
+            self._quiet = self._quiet + _BLOCK if self._still() else 0
         if data.sensordata[-4] > 0:  # contacts of hand and part
             self._set_torsion()
         self._call_watch(1)
@@ -346,6 +353,10 @@ class Simulation:
         return free
 
     def _at_rest(self) -> bool:
+        """Whether the parts have been at rest for `_REST_S`."""
+        return self._quiet >= self.n_steps(_REST_S) and self._still()
+
+    def _still(self) -> bool:
         speeds = self.data.qvel[9:].reshape(-1, 2, 3)
         return bool((np.abs(speeds).max(axis=(0, 2)) < _REST_SPEED).all())
 
@@ -354,8 +365,9 @@ class Simulation:
         quiet, enough = 0, self.n_steps(_REST_S)
         for _ in range(self.n_steps(_SETTLING_S)):
             self.stand(self.step_s, stop=lambda: False)
-            quiet = quiet + 1 if self._at_rest() else 0
+            quiet = quiet + 1 if self._still() else 0
             if quiet >= enough:
+                self._quiet = enough
                 return
 
     def _limit_fingers(self, force: float) -> None:

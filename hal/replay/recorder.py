@@ -70,7 +70,10 @@ class RecordingCamera(SharingDevice, Camera):
     def capture(self, timeout_s: float = 5.0) -> RgbdFrame:
         """See `Camera.capture`."""
         return self._writer.call(
-            "capture", {}, lambda: self._camera.capture(timeout_s), result=lambda frame: self._writer.frame(frame, by_hand=self._camera.by_hand)
+            "capture",
+            {},
+            lambda: self._camera.capture(timeout_s),
+            result=lambda frame: self._writer.frame(frame, by_hand=self._camera.by_hand),
         )
 
 

@@ -72,7 +72,7 @@ def fit_plane(points: np.ndarray, region: tuple[float, float, float, float], fla
         )
     if max(abs(slope_x), abs(slope_y)) > STEEPEST:
         raise NoPlane(
-            f"the touched table rises by {1e3 * slope_x:.0f} mm a metre along x and {1e3 * slope_y:.0f} along "
+            f"the touched table rises by {1e3 * slope_x:.0f} mm a metre along x, {1e3 * slope_y:.0f} along "
             f"y; at most {1e3 * STEEPEST:g} either way are possible. Level it, or clear what the fingers met"
         )
     half = np.array([x_max - x_min, y_max - y_min]) / 2

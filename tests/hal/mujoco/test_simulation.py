@@ -11,7 +11,7 @@ from hal.config import READY
 from hal.mujoco.config import MujocoPhysics
 from hal.mujoco.simulation import Simulation
 from mskgrasp.core.geometry import Pose, pose_distance
-from mskgrasp.core.grasp import PAD_REACH
+from mskgrasp.core.grasp import MAX_OPENING, PAD_REACH
 from mskgrasp.core.panda_kinematics import forward_pose, top_down
 from mskgrasp.parts import find_part
 from mskgrasp.parts.solids import shape as h
@@ -46,6 +46,18 @@ def test_a_part_in_free_fall_falls_by_half_g_t_squared(box: MakeBox):
     fallen = 0.5 - simulation.part_pose().position[2]
     # Symplectic steps of h add g t h / 2.
     assert fallen == pytest.approx(G * seconds**2 / 2, abs=1.1 * G * seconds * simulation.step_s / 2)
+
+
+def test_a_part_at_the_top_of_a_throw_is_not_at_rest(box: MakeBox):
+    """The arm moves through air meanwhile, which is not simulated while all parts are at rest."""
+    simulation = on_table(box((0.03, 0.02, 0.04), 0.05))
+    n_up = 40
+    simulation.data.qvel[11] = G * n_up * simulation.step_s
+    simulation.stand(n_up * simulation.step_s, stop=never)
+    assert np.abs(simulation.data.qvel[9:]).max() < 1e-3 and simulation.part_pose().position[2] > 0.025
+    away = np.array(READY) + [0.3, 0, 0, 0, 0, 0, 0]
+    assert simulation.follow(np.linspace(READY, away, simulation.n_steps(0.5)), stop=never)
+    assert simulation.part_pose().position[2] == pytest.approx(0.02, abs=0.02 * MM)
 
 
 def test_parts_on_very_many_points_do_not_fall_through_the_table():
@@ -121,6 +133,15 @@ def test_pads_that_touch_at_one_point_resist_turning_by_the_radius_of_their_patc
     limit = 2 * MU * 20.0 * MujocoPhysics().pad_patch_radius
     assert shift(held(tips, height=0.015), [0, 0, 0, 0, 0.8 * limit, 0])[1] < 0.01
     assert shift(held(tips, height=0.015), [0, 0, 0, 0, 1.1 * limit, 0])[1] > 0.1
+
+
+def test_the_pads_leave_what_they_hold_at_once(box: MakeBox):
+    simulation = held(box((0.03, 0.02, 0.04), 0.05))
+    began = simulation.data.time
+    simulation.move_fingers(MAX_OPENING, force=None, stop=never)
+    ramp = (MAX_OPENING - 0.03) / (2 * simulation.physics.finger_speed)
+    assert simulation.width == pytest.approx(MAX_OPENING, abs=MM)
+    assert simulation.data.time - began < ramp + 0.3
 
 
 def test_a_held_part_does_not_creep(box: MakeBox):
