@@ -23,7 +23,7 @@ from mskgrasp.view.config import ViewConfig
 from mskgrasp.view.dataset_panel import shift_text
 from mskgrasp.view.live_arm import LiveArm
 from mskgrasp.view.main_thread import Work
-from mskgrasp.view.page import Page, Panel
+from mskgrasp.view.page import Page, Panel, plain
 from mskgrasp.view.plan_view import PlanView, Shown
 from mskgrasp.view.scene import part_mesh
 
@@ -105,7 +105,7 @@ class CellPanel(Panel):
         try:
             plan = self._planner.plan(frame, np.random.default_rng(self._seed))
         except (NoPartFound, NoGraspFound) as error:
-            self.text.content = f"**no plan**: {error}"
+            self.text.content = f"**no plan**: {plain(error)}"
             self._show(frame, None)
             return
         self._set_plan(plan)
@@ -201,9 +201,9 @@ class CellPanel(Panel):
                 )
                 return
             if result.aborted is not None:
-                self.page.tell(f"**the arm stopped**: {result.aborted}")
+                self.page.tell(f"**the arm stopped**: {plain(result.aborted)}")
                 return
-            text = f"not lifted ({done.reason})" if done.reason else "lifted and held"
+            text = f"not lifted ({plain(done.reason)})" if done.reason else "lifted and held"
             if done.displacement is not None and done.before is not None:
                 text += f"; the part's origin moved {shift_text(done.displacement)}"
                 self._show(frame, plan, done.displacement, done.before)
@@ -240,7 +240,7 @@ class CellPanel(Panel):
             self.page.tell("there is no plan to execute; plan again")
         else:
             way = f"lifts by {self.cell.workspace.lift_height:g} m, puts the part down and goes home"
-            question = f"{plan.summary}. The arm grasps, {way}. Keep clear of it. May it move?"
+            question = f"{plain(plan.summary)}. The arm grasps, {way}. Keep clear of it. May it move?"
             self._ask(event, question, lambda: self.execute(plan))
 
     def _ask_to_recover(self, event: GuiEvent[GuiButtonHandle]) -> None:
@@ -259,16 +259,16 @@ class CellPanel(Panel):
             return
         gui = event.client.gui
         modal = gui.add_modal("May the arm move?")
+        before = self._n_stops
         with modal:
             gui.add_markdown(question)
             yes, no = gui.add_button("yes, move", color="red"), gui.add_button("no")
 
         def agreed(_: GuiEvent) -> None:
             modal.close()
-            before = self._n_stops
 
             def move() -> None:
-                # The main thread may have had other work to do; a recovery would lift a stop of meanwhile.
+                # A recovery would lift a stop of since: while the question was open, or other work was done.
                 if self._n_stops == before:
                     work()
                 else:
@@ -283,4 +283,4 @@ class CellPanel(Panel):
 def in_markdown(text: str) -> str:
     """Lines of a name and its values, two spaces apart or more, as Markdown that a narrow panel wraps."""
     rows = (line.split("  ", 1) for line in text.splitlines())
-    return "\n\n".join(f"**{name}** {values.strip()}" for name, values in rows)
+    return "\n\n".join(f"**{name}** {plain(values.strip())}" for name, values in rows)

@@ -15,7 +15,7 @@ from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.footprint import pixel_pitch, seen_points
 from mskgrasp.view.attempt_list import ALL, AttemptList, resting_poses
 from mskgrasp.view.motion import Player
-from mskgrasp.view.page import Page, Panel
+from mskgrasp.view.page import Page, Panel, plain
 from mskgrasp.view.replay import AttemptSimulator, Replay
 from mskgrasp.view.scene import (
     HandNode,
@@ -81,7 +81,7 @@ class DatasetPanel(Panel):
 
     def shown(self) -> None:
         """Say why the part has no mesh, if it has none."""
-        self.page.tell(self._without_mesh)
+        self.page.tell(plain(self._without_mesh))
 
     def read(self) -> None:
         """Read the attempts at the chosen part."""
@@ -111,7 +111,7 @@ class DatasetPanel(Panel):
     def draw(self) -> None:
         """Draw the attempt as the controls say."""
         self.player.clear()
-        self.page.tell(self._without_mesh)  # in place of the outcome of another attempt
+        self.page.tell(plain(self._without_mesh))  # in place of the outcome of another attempt
         with self.page.server.atomic():
             self._nodes.remove()
             self._nodes = self.page.scene.add_frame(self._name, show_axes=False)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from viser import GuiEvent
 
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_body import PANDA_LINKS
@@ -54,6 +55,7 @@ class Player:
             self.speed = page.gui.add_dropdown("speed", tuple(SPEEDS))
             self.play_button = page.gui.add_button("play")
         panel.on(self.time, self._draw)
+        self.time.on_update(self._hold)
         panel.on(self.play_button, self.play)
 
     def load(self, motion: Motion, mesh: trimesh.Trimesh) -> None:
@@ -92,6 +94,11 @@ class Player:
         if now >= last:
             self._page.main.repeat(self._key, None)
         self.time.value = min(now, last)  # which draws it
+
+    def _hold(self, event: GuiEvent) -> None:
+        """End the playback where the user moves the slider, which playing moves as well."""
+        if event.client is not None:
+            self._page.main.repeat(self._key, None)
 
     def _draw(self) -> None:
         motion = self._motion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from viser import FrameHandle, GuiButtonHandle, GuiEvent, GuiFolderHandle, GuiInputHandle
@@ -44,7 +45,7 @@ class Page:
         server.initial_camera.look_at = (x, y, 0.01)
 
     def tell(self, text: str) -> None:
-        """Show a line or a paragraph under the panel, in place of the last one."""
+        """Show Markdown under the panel, in place of the last; what is not its own text is `plain`."""
         self._status.content = text
 
     @property
@@ -55,7 +56,7 @@ class Page:
     def fail(self, error: MskgraspError) -> None:
         """Show an error on the page, and print it."""
         note(f"mskgrasp.view: {error}")
-        self.tell(f"**{type(error).__name__}**: {error}")
+        self.tell(f"**{type(error).__name__}**: {plain(error)}")
 
     def show(self, name: str) -> None:
         """Show one panel with what it has drawn, and hide the others."""
@@ -111,3 +112,11 @@ class Panel:
             control.on_click(act)
         else:
             control.on_update(act)
+
+
+def plain(text: object) -> str:
+    """Text of a file or an error for Markdown: shown as it is.
+
+    The page renders tags in Markdown as they stand, and a script there could press its buttons.
+    """
+    return re.sub(r"[&<>\\`*_\[\]|~#!$]", lambda sign: f"&#{ord(sign[0])};", str(text))

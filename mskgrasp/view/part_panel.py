@@ -7,7 +7,7 @@ import numpy as np
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.settings import REGION, TABLE_Z
 from mskgrasp.parts import Part
-from mskgrasp.view.page import Page, Panel
+from mskgrasp.view.page import Page, Panel, plain
 from mskgrasp.view.scene import add_hulls, add_part, part_mesh
 
 ALL = "all, side by side"
@@ -90,7 +90,7 @@ def part_text(part: Part) -> str:
     """A part's properties in words, as Markdown."""
     size = " x ".join(f"{1e3 * edge:.1f}" for edge in part.extents)
     return (
-        f"**{part.name}** ({part.family}; {part.source})\n\n"
+        f"**{plain(part.name)}** ({plain(part.family)}; {plain(part.source)})\n\n"
         f"{size} mm, {1e3 * part.mass:.1f} g; {part.n_hulls} hulls, {part.grade}: 95 % within "
         f"{1e3 * part.hull_error_p95:.2f} mm of the mesh, at most {1e3 * part.hull_error:.2f} mm off"
     )

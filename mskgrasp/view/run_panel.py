@@ -8,14 +8,15 @@ import cv2
 import numpy as np
 import trimesh
 
+from mskgrasp.core.config import read_yaml
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.core.grasp import pose_base_tcp
-from mskgrasp.core.settings import REGION, TABLE_Z
+from mskgrasp.core.settings import REGION, TABLE_Z, Region
 from mskgrasp.parts import find_part
 from mskgrasp.trials.trial_files import read_trial
 from mskgrasp.view.dataset_panel import shift_text
-from mskgrasp.view.page import Page, Panel
+from mskgrasp.view.page import Page, Panel, plain
 from mskgrasp.view.plan_view import PlanView, Shown
 from mskgrasp.view.scene import HandNode, add_part, add_region, part_mesh, place
 from mskgrasp.view.stored_run import StoredTrial
@@ -34,11 +35,12 @@ class RunPanel(Panel):
         super().__init__(page, "run")
         self._trials = {trial.name: trial for trial in trials}
         self._meshes: dict[str, trimesh.Trimesh | None] = {}
+        self._region = region_of(folder)
         self._name = f"{self.root.name}/trial"
         self._nodes = page.scene.add_frame(self._name, show_axes=False)
         gui = page.gui
         with self.folder:
-            gui.add_markdown(f"{folder}: {len(trials)} trials")
+            gui.add_markdown(f"{plain(folder)}: {len(trials)} trials")
             self.choice = gui.add_dropdown("trial", tuple(self._trials))
             self.text = gui.add_markdown("")
             self.picture = gui.add_image(np.full((8, 8, 3), 255, np.uint8), visible=False)
@@ -68,13 +70,16 @@ class RunPanel(Panel):
         if mesh is not None:
             add_part(self.page.scene, f"{self._name}/before", mesh, trial.T_base_obj)
         frame, plan, _ = read_trial(trial.file)
-        x, y, _ = frame.T_base_camera.position
-        half = (REGION[1] - REGION[0]) / 2
+        region = self._region
+        if region is None and plan is not None:
+            x, y, _ = plan.view.centre_base
+            half = (REGION[1] - REGION[0]) / 2
+            region = (x - half, x + half, y - half, y + half)
         self.view.show(
             Shown(
                 frame=frame,
                 table_z=TABLE_Z if plan is None else plan.view.table_z,
-                region=(x - half, x + half, y - half, y + half),
+                region=region or REGION,
                 plan=plan,
                 mesh=mesh,
                 T_base_obj=trial.T_base_obj,
@@ -85,7 +90,7 @@ class RunPanel(Panel):
 
     def _draw_without_frame(self, trial: StoredTrial) -> None:
         scene = self.page.scene
-        add_region(scene, f"{self._name}/region", REGION, TABLE_Z)
+        add_region(scene, f"{self._name}/region", self._region or REGION, TABLE_Z)
         if trial.grasp is not None:
             HandNode(scene, f"{self._name}/hand").place(pose_base_tcp(trial.grasp))
         if trial.target is not None:
@@ -110,9 +115,21 @@ class RunPanel(Panel):
             self.picture.image = image[..., ::-1]
 
 
+def region_of(folder: Path) -> Region | None:
+    """Region of the simulated cell of a run: x_min, x_max, y_min, y_max, base frame, metres.
+
+    None where the run is of another cell, whose file it does not hold.
+    """
+    path = folder / "cell.yaml"
+    if not path.is_file():
+        return None
+    x_min, x_max, y_min, y_max = read_yaml(path).get("region", REGION)
+    return x_min, x_max, y_min, y_max
+
+
 def trial_text(trial: StoredTrial) -> str:
     """A trial in words, as Markdown."""
-    lines = [f"**{trial.outcome}**"]
+    lines = [f"**{plain(trial.outcome)}**"]
     if trial.predicted is not None:
         lines.append(f"expected: {shift_text(trial.predicted)}")
     if trial.measured is not None:

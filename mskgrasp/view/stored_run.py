@@ -96,12 +96,18 @@ def _placed(folder: Path, values: dict[str, Any]) -> StoredTrial:
         part=values["part"],
         outcome=f"{outcome}; correction: {values['correction']}",
         picture=picture if picture.is_file() else None,
-        grasp=_array(values.get("grasp")),
-        predicted=_array(values.get("predicted")),
-        measured=_array(values.get("measured")),
-        target=_array(values["target"]),
+        grasp=_array(values.get("grasp"), 4),
+        predicted=_array(values.get("predicted"), 4),
+        measured=_array(values.get("measured"), 4),
+        target=_array(values["target"], 3),
     )
 
 
-def _array(values: Any) -> np.ndarray | None:
-    return None if values is None else np.array(values, dtype=np.float64)
+def _array(values: Any, size: int | None = None) -> np.ndarray | None:
+    """Numbers of a trial; ValueError where there are not so many. `Trial.from_json` has counted its own."""
+    if values is None:
+        return None
+    array = np.array(values, dtype=np.float64)
+    if size is not None and array.shape != (size,):
+        raise ValueError(f"{values} are not {size} numbers")
+    return array

@@ -220,6 +220,19 @@ def test_a_stop_after_a_yes_holds_though_the_motion_has_not_begun(
     assert moved == [] and "nothing moved" in page.said
 
 
+def test_a_stop_while_a_question_is_open_holds_after_the_yes(page: Page, engine: TrialEngine, monkeypatch):
+    panel = panel_of(page, engine, allow_motion=True)
+    arm = engine.cell.arm
+    moved: list[str] = []
+    monkeypatch.setattr(arm, "recover", lambda: moved.append("recovered"))
+    monkeypatch.setattr(arm, "stop", lambda: None)
+    question = asked(page, panel._ask_to_recover)
+    panel.stop_button.value = True  # on another browser
+    question.buttons["yes, move"].value = True
+    work(page)
+    assert moved == [] and "nothing moved" in page.said
+
+
 def test_an_error_of_live_plans_is_met_no_more_often_than_a_plan(
     page: Page, engine: TrialEngine, monkeypatch
 ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -115,7 +116,7 @@ def test_a_part_that_is_no_longer_what_was_grasped_is_shown_without_its_mesh_and
     work(page)
     page.begin()
     work(page)
-    assert message in page.said and panel.again.disabled
+    assert message in html.unescape(page.said) and panel.again.disabled
     assert has_node(page, "/dataset/attempt/hand") and not has_node(page, "/dataset/attempt/before")
 
 

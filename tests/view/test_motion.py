@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 import trimesh
+from viser import GuiEvent
 
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import HOME
@@ -48,5 +51,11 @@ def test_a_motion_is_played_to_its_end_and_can_be_moved_to_any_time(page: Page):
     player.time.value = 0.1
     work(page)
     assert pose_of(page, "/p/motion/part").position[2] == pytest.approx(0.05)
+    player.play()
+    player._hold(cast(GuiEvent, SimpleNamespace(client="the user's", target=player.time)))
+    player.time.value = 0.1
+    for _ in range(3):
+        work(page)
+    assert player.time.value == 0.1  # and does not go on
     player.clear()
     assert not has_node(page, "/p/motion/part")

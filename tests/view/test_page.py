@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import html
+
+import pytest
+from markdown_it import MarkdownIt
+
 from mskgrasp.core.errors import NoPartFound
-from mskgrasp.view.page import Page, Panel
+from mskgrasp.view.page import Page, Panel, plain
 from tests.view.conftest import has_node, work
 
 
@@ -48,6 +53,16 @@ def test_an_error_is_shown_on_the_page_and_printed(page: Page, capsys):
     work(page)
     assert page.said == "**NoPartFound**: nothing lies on the table"
     assert capsys.readouterr().err == "mskgrasp.view: nothing lies on the table\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['missed<iframe srcdoc="x">', "bracket <rev B>.stl", "*a* _b_ `c` &lt; \\<b> [d](javascript:e) # f"],
+)
+def test_text_of_files_is_shown_as_it_is(text: str):
+    """The parser is of the same standard as the page's, and passes tags on, too."""
+    assert html.unescape(MarkdownIt("commonmark").render(plain(text))) == f"<p>{text}</p>\n"
+    assert "<iframe" in MarkdownIt("commonmark").render("<iframe>")
 
 
 def test_a_control_hands_its_work_to_the_main_thread(page: Page):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+
 import numpy as np
 import pytest
 
@@ -50,5 +52,5 @@ def test_hulls_are_drawn_in_the_translucent_mesh_or_alone(page: Page):
 
 
 def test_the_text_gives_size_and_mass():
-    text = part_text(PART)
+    text = html.unescape(part_text(PART))
     assert f"{1e3 * PART.mass:.1f} g" in text and "46.0" in text and PART.name in text

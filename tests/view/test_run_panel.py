@@ -6,11 +6,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 from mskgrasp.core.geometry import Pose
 from mskgrasp.trials.trial_files import write_trial
 from mskgrasp.view.page import Page
-from mskgrasp.view.run_panel import RunPanel, trial_text
+from mskgrasp.view.run_panel import RunPanel, region_of, trial_text
 from mskgrasp.view.stored_run import StoredTrial
 from tests.planning.hand_made import FRAME, planner
 from tests.view.conftest import has_node, node, pose_of, work
@@ -54,6 +55,19 @@ def test_each_trial_is_drawn_with_what_is_stored_of_it(page: Page, tmp_path: Pat
     work(page)
     assert not panel.picture.visible and not has_node(page, "/run/trial/before")
     assert hasattr(node(page, "/run/plan/expected"), "points")  # a part that is not here: as it was seen
+
+
+def test_the_region_of_a_run_is_its_cells_wherever_the_camera_is(page: Page, tmp_path: Path):
+    assert region_of(tmp_path) is None  # of another than a simulated cell
+    panel = RunPanel(page, tmp_path, trials(tmp_path))
+    panel.shown()
+    assert panel.view._shown is not None
+    x_min, x_max, y_min, y_max = panel.view._shown.region
+    assert [(x_min + x_max) / 2, (y_min + y_max) / 2] == pytest.approx(PLAN.view.centre_base[:2])
+    (tmp_path / "cell.yaml").write_text("type: sapien\nregion: [0.4, 0.5, -0.1, 0.0]\n")
+    panel = RunPanel(page, tmp_path, trials(tmp_path))
+    panel.shown()
+    assert panel.view._shown is not None and panel.view._shown.region == (0.4, 0.5, -0.1, 0.0)
 
 
 def test_a_height_that_was_not_measured_is_said_to_be_so():

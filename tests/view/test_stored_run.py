@@ -57,6 +57,13 @@ def test_a_run_of_palletize_holds_targets_and_pictures(tmp_path: Path):
     np.testing.assert_array_equal(first.target, PLACEMENT.target)
 
 
+@pytest.mark.parametrize("damage", [{"target": [0.5, 0.06]}, {"predicted": [0.1]}, {"grasp": [1, 2, 3]}])
+def test_a_damaged_placement_is_an_error_of_one_line(tmp_path: Path, damage: dict[str, list]):
+    append_trial(tmp_path / TRIALS, PLACEMENT.to_json() | damage)
+    with pytest.raises(BadDataset, match=r"trials.jsonl.*line 1"):
+        read_run(tmp_path)
+
+
 def test_what_is_no_run_of_these_programs_is_refused(tmp_path: Path):
     with pytest.raises(UsageError, match="no run of evaluate or palletize"):
         read_run(tmp_path)
