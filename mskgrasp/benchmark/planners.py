@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import shlex
 import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 from hal.backends import find_backend, package_of
@@ -23,6 +26,7 @@ from mskgrasp.planning.planner import Planner
 from mskgrasp.planning.program_planner import ProgramPlanner
 from mskgrasp.planning.proposal import GROUP, OtherPlanner, installed_planner
 from mskgrasp.planning.run_inputs import kept_certified
+from mskgrasp.runtime.run_folder import file_digest
 from mskgrasp.trials.engine import PlansGrasps
 
 _KNOWN = (*BUILT_IN, PROGRAM)
@@ -80,8 +84,31 @@ def _check_program(command: str) -> None:
 
 
 def package_digests(names: tuple[str, ...]) -> dict[str, str]:
-    """Packages of the planners that are not of this program, with versions, by the planner's name."""
-    return {f"planner {name}": str(package_of(name, GROUP)) for name in names if name not in _KNOWN}
+    """Package, version and digest of the code of every planner that is not of this program."""
+    others = [name for name in names if name not in _KNOWN]
+    packages = {f"planner {name}": str(package_of(name, GROUP)) for name in others}
+    found = entry_points(group=f"mskgrasp.{GROUP}")
+    codes = {f"code of planner {one.name}": _code_digest(one.module) for one in found if one.name in others}
+    return packages | codes
+
+
+def _code_digest(module: str) -> str:
+    """SHA-256 of all Python files of the package that holds a module, or of the module's own."""
+    try:
+        # Of the outermost package alone: to find a module within it would run the package's code.
+        spec = find_spec(module.partition(".")[0])
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return "not found"  # refused, with the remedy, when the planner is made
+    digest = hashlib.sha256()
+    folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
+    files = [(path.relative_to(one), path) for one in folders for path in one.rglob("*.py")]
+    if not folders and spec.has_location:
+        files = [(Path(), Path(str(spec.origin)))]
+    for name, path in sorted(files):
+        digest.update(f"{name} {file_digest(path)}\n".encode())
+    return digest.hexdigest()
 
 
 @dataclass

@@ -73,3 +73,23 @@ def test_a_planner_that_cannot_run_is_refused_first(settings, error, message):
 
 def test_planners_of_this_program_are_of_no_package():
     assert package_digests(("ours", "program", "theirs")) == {"planner theirs": "None"}
+
+
+@pytest.mark.parametrize("edited", ["mine.py", "mine_pack/__init__.py", "mine_pack/deep/nets.py"])
+def test_an_edit_of_a_planners_code_is_noticed(edited, tmp_path: Path, monkeypatch):
+    module = edited.partition("/")[0].removesuffix(".py")
+    info = tmp_path / "my_planner-1.0.dist-info"
+    (tmp_path / "mine_pack" / "deep").mkdir(parents=True)
+    info.mkdir()
+    for name in ("mine.py", "mine_pack/__init__.py", "mine_pack/deep/nets.py"):
+        (tmp_path / name).write_text("raise SystemExit('imported')")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my_planner\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[mskgrasp.planners]\nmy_planner = {module}:make_planner\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    before = package_digests(("my_planner", "ours"))
+    (tmp_path / "other.py").write_text("of another package")
+    assert package_digests(("my_planner", "ours")) == before
+    (tmp_path / edited).write_text("edited")
+    after = package_digests(("my_planner", "ours"))
+    assert {name for name in after if after[name] != before[name]} == {"code of planner my_planner"}
+    assert after["planner my_planner"] == "my_planner 1.0"
