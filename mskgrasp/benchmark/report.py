@@ -91,7 +91,8 @@ def write_report(out: Path, trials: Sequence[PlacedTrial], facts: RunFacts) -> t
         _budget_section([one for one in budget if not one.part]),
         _parts_section(trials, facts),
         _part_budgets_section([one for one in budget if one.part]),
-        settings_section(facts.settings),
+        # The noise of the settings is unset where it is that of the cell's file.
+        settings_section({**facts.settings, "noise": facts.noise}),
     ]
     write_html(out / "report.html", title="Placed within a tolerance", conclusion=headline, sections=sections)
     return headline, sections
@@ -124,17 +125,19 @@ def conclusion(rows: Sequence[Row], facts: RunFacts) -> str:
     best = first[0]
     found, without = best.first("predicted"), best.first("none")
     lead = f"Of all {found.of} attempts at {best.n_parts} parts"
+    noise = "" if facts.noise == "off" else f" with {facts.noise} noise"
+    cell = f"in the cell {facts.cell}{noise}"
     if most == 0:
-        return f"{lead}, no planner places any within {TOLERANCE}, in the cell {facts.cell}."
+        return f"{lead}, no planner places any within {TOLERANCE}, {cell}."
     low, high = found.interval
     placed = f"{found.value:.0%} corrected by its prediction (95 % interval {low:.0%} to {high:.0%})"
     if len(first) > 1:
         names = " and ".join(row.planner for row in first)
-        return f"{lead}, {names} each place {placed} within {TOLERANCE}, in the cell {facts.cell}."
+        return f"{lead}, {names} each place {placed} within {TOLERANCE}, {cell}."
     places = "places" if len(rows) == 1 else "places most"
     return (
         f"{lead}, {best.planner} {places} within {TOLERANCE}: {placed}, {without.value:.0%} without a "
-        f"correction, in the cell {facts.cell}."
+        f"correction, {cell}."
     )
 
 

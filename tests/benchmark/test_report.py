@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -64,6 +65,14 @@ def test_the_first_line_names_the_planner_that_places_most(written):
 )
 def test_a_winner_is_named_only_where_there_is_one(trials, said):
     assert said in conclusion(summarise(trials, 0), facts_of(PARTS[:1]))
+
+
+@pytest.mark.parametrize("trials", [[made(0)], [made(0), made(0, "centroid")], [failed(0)]])
+def test_the_noise_of_a_cells_file_is_named(trials, tmp_path):
+    facts = replace(facts_of(PARTS[:1]), cell="my.yaml", noise="kinect2", settings=dict(noise=None))
+    headline, sections = write_report(tmp_path, trials, facts)
+    assert headline.endswith("in the cell my.yaml with kinect2 noise.")
+    assert ("noise", "kinect2") in sections[-1].tables[0].rows
 
 
 def test_the_numbers_are_stored(written):
