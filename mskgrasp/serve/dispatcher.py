@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 import traceback
 from collections import deque
@@ -14,6 +15,8 @@ from mskgrasp.core.errors import MskgraspError
 from mskgrasp.serve.planner_process import PlannerProcess, ProcessEnded
 from mskgrasp.serve.rejection import Rejected, error_body
 
+LOOK_S = 1.0
+"""Time after which an idle process is looked after: it may have been killed, as by a lack of memory."""
 AGAIN_S = 5.0
 """Time until a process that could not be started again is tried once more, seconds."""
 
@@ -44,7 +47,7 @@ class Dispatcher:
         self._most = len(processes) * (1 + waiting)
         self._timeout_s = timeout_s
         self._n_open = 0
-        self._n_working = len(processes)
+        self._ready = set(processes)
         self._jobs: deque[_Job] = deque()
         self._offered = asyncio.Semaphore(0)
         self._threads = ThreadPoolExecutor(len(processes))
@@ -53,7 +56,8 @@ class Dispatcher:
     @property
     def status(self) -> dict[str, int]:
         """Number of processes, of those that work, and of requests that are worked on or wait."""
-        return {"workers": len(self._processes), "working": self._n_working, "requests": self._n_open}
+        working = sum(process.alive for process in self._ready)
+        return {"workers": len(self._processes), "working": working, "requests": self._n_open}
 
     def open(self) -> None:
         """Begin to distribute."""
@@ -97,8 +101,16 @@ class Dispatcher:
     async def _serve(self, process: PlannerProcess) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            await self._offered.acquire()
-            if not self._jobs:  # it took too long while it waited
+            offered = False
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_S):
+                    offered = await self._offered.acquire()
+            if not process.alive:
+                if offered:  # another process may be free
+                    self._offered.release()
+                await self._start_again(process)
+                continue
+            if not offered or not self._jobs:  # the job took too long while it waited
                 continue
             job = self._jobs.popleft()
             try:
@@ -117,7 +129,7 @@ class Dispatcher:
             del job  # a body of megabytes is not kept until the next one comes
 
     async def _start_again(self, process: PlannerProcess) -> None:
-        self._n_working -= 1
+        self._ready.discard(process)
         while True:
             try:
                 process.start()
@@ -126,7 +138,7 @@ class Dispatcher:
             except (MskgraspError, OSError) as error:
                 print(f"mskgrasp.serve: {error}", file=sys.stderr, flush=True)
                 await asyncio.sleep(AGAIN_S)
-        self._n_working += 1
+        self._ready.add(process)
 
 
 def _settle(job: _Job, answer: tuple[int, bytes]) -> None:

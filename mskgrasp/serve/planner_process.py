@@ -56,6 +56,12 @@ class PlannerProcess:
         """Its number in the operating system; None before it is started."""
         return self._process.pid if self._process is not None else None
 
+    @property
+    def alive(self) -> bool:
+        """Whether it runs, be it that it still loads the model."""
+        process = self._process  # another thread may end it meanwhile
+        return process is not None and process.is_alive()
+
     def start(self) -> None:
         """Start the process, or start it again; it loads the model meanwhile: see `wait_until_ready`.
 

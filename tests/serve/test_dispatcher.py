@@ -74,6 +74,30 @@ def test_what_exceeds_queue_or_time_is_503_and_a_process_that_dies_is_replaced(p
     asyncio.run(story())
 
 
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_process_that_is_killed_while_idle_is_replaced_and_no_image_is_blamed(
+    asked: bool, process: PlannerProcess
+):
+    async def story() -> None:
+        dispatcher = Dispatcher([process], waiting=1, timeout_s=60.0)
+        dispatcher.open()
+        await asyncio.sleep(0)
+        before = process.pid
+        assert before is not None
+        os.kill(before, signal.SIGKILL)
+        while process.alive:
+            time.sleep(0.01)
+        assert dispatcher.status == {"workers": 1, "working": 0, "requests": 0}
+        if asked:
+            assert (await ask(dispatcher))[0] == 200
+        while not dispatcher.status["working"]:
+            await asyncio.sleep(0.05)
+        assert process.pid != before
+        await dispatcher.close()
+
+    asyncio.run(story())
+
+
 def test_an_error_that_nobody_foresaw_is_a_500_and_the_next_request_is_answered(
     process: PlannerProcess, monkeypatch, capsys
 ):
