@@ -76,7 +76,8 @@ def make_app(
 
     async def about_a_frame(kind: Kind, request: Request) -> Response:
         content_type = _content_type(request, (JSON, NPZ))
-        body = await read_body(request, max_body, timeout_s)
+        remedy = "send a smaller image, or start with a larger --max-body-mb"
+        body = await read_body(request, max_body, timeout_s, remedy)
         status, answer = await dispatcher.ask(kind, content_type, body)
         return Response(answer, status, media_type=JSON, headers=_headers(status))
 
@@ -94,7 +95,8 @@ def make_app(
     async def place(request: Request) -> Response:
         """Pose of the hand at which the held part is at the target."""
         _content_type(request, (JSON,))
-        body = await read_body(request, MAX_PLACE_BYTES, timeout_s)
+        remedy = f"send only {', '.join(PlaceRequest.model_fields)}"
+        body = await read_body(request, MAX_PLACE_BYTES, timeout_s, remedy)
         return _json(place_answer(parse_json(PlaceRequest, body), lowest_grasp_z))
 
     @app.get("/health")
@@ -111,15 +113,13 @@ def make_app(
     return app
 
 
-async def read_body(request: Request, most: int, timeout_s: float) -> bytes:
+async def read_body(request: Request, most: int, timeout_s: float, remedy: str) -> bytes:
     """Read a request's body.
 
     Raises:
-        Rejected: 413, it has more than ``most`` bytes; 408, it took longer than ``timeout_s``.
+        Rejected: 413, it has more than ``most`` bytes, and the remedy; 408, it took over ``timeout_s``.
     """
-    message = (
-        f"the request has more than {most} bytes; send a smaller image, or start with a larger --max-body-mb"
-    )
+    message = f"the request has more than {most} bytes; {remedy}"
     if int(request.headers.get("content-length", 0)) > most:
         raise Rejected(413, message)
     body = bytearray()

@@ -127,7 +127,9 @@ WRONG: dict[str, tuple[str, bytes, str, int, str]] = {
     "a target elsewhere": ("/place", placing(target={"x": 1e9, "y": 0, "theta": 0}), JSON, 400, "target.x"),
     "a target with more": ("/place", placing(target=PLACE["target"] | {"z": 1}), JSON, 400, "target.z"),
     "a long displacement": ("/place", placing(displacement=[9, 0, 0, 0]), JSON, 400, "displacement.0"),
-    "a long place": ("/place", placing() + b" " * 20_000, JSON, 413, "more than 10000 bytes"),
+    "a long place": (
+        "/place", placing() + b" " * 20_000, JSON, 413, "more than 10000 bytes; send only grasp, displ",
+    ),
     "too large": ("/plan", bytes(int(BODY_MB * 1e6) + 1), NPZ, 413, "more than 1000000 bytes"),
     "an unknown path": ("/plans", text(), JSON, 404, "legal: POST /plan"),
     "a path with a slash": ("/plan/", text(), JSON, 404, "POST /plan/: not found; legal: POST /plan"),
