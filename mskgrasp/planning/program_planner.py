@@ -32,6 +32,9 @@ TIMEOUT_S = 60.0
 """Time in which a program must answer, the start of its process included."""
 _GRACE_S = 2.0
 """Time in which a program may end by itself."""
+# Its input ends when this process does, for whatever reason. The kernel's parent-death signal would need
+# preexec_fn, which may deadlock beside threads, and would spare what the program itself has started.
+_CLEAN_UP = 'read -r _; kill -KILL "-$1"; rm -rf -- "$2"'
 _FIELDS = ("quality", "displacement", "displacement_cov", "point_base")
 
 
@@ -55,7 +58,7 @@ def write_frame(path: Path, frame: RgbdFrame, workspace: Workspace) -> None:
 
 
 class ProgramPlanner:
-    """Process of a program that plans; started with the first request, ended by `close`.
+    """Process of a program that plans; started with the first request, ended by `close` or with this process.
 
     Args:
         command: The program and its arguments.
@@ -68,6 +71,7 @@ class ProgramPlanner:
         self._workspace = workspace
         self._timeout_s = timeout_s
         self._process: subprocess.Popen[str] | None = None
+        self._watch: subprocess.Popen[bytes] | None = None
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._log = tempfile.TemporaryFile()
         self._folder = tempfile.TemporaryDirectory()
@@ -93,6 +97,10 @@ class ProgramPlanner:
 
     def close(self) -> None:
         """End the program; safe to call twice."""
+        if self._watch is not None:
+            with self._watch:
+                self._watch.kill()
+            self._watch = None
         if self._process is not None:
             assert self._process.stdin is not None and self._process.stdout is not None
             with contextlib.suppress(OSError):
@@ -153,10 +161,17 @@ class ProgramPlanner:
                     # Ctrl-C is for this program, which then ends the other.
                     start_new_session=True,
                 )
+                self._reader = threading.Thread(target=self._read, args=(self._process,), daemon=True)
+                self._reader.start()
+                self._watch = subprocess.Popen(
+                    ["sh", "-c", _CLEAN_UP, "sh", str(self._process.pid), self._folder.name],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    start_new_session=True,
+                )
             except (OSError, ValueError, IndexError) as error:
                 raise BadPlanner(f"the program {self._command!r} cannot be started: {error}") from error
-            self._reader = threading.Thread(target=self._read, args=(self._process,), daemon=True)
-            self._reader.start()
         return self._process
 
     def _read(self, process: subprocess.Popen[str]) -> None:

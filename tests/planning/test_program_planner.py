@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+import signal
+import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -129,8 +132,35 @@ def test_what_a_program_started_ends_with_it(child, ends, message, tmp_path):
     with pytest.raises(BadPlanner, match=message):  # a child may keep the output of a program that has ended
         ask(planner)
     planner.close()
-    number, deadline = (tmp_path / "child").read_text().strip(), time.monotonic() + 30
-    while lives(number):  # a process that is killed ends when it gets a turn
+    wait_until(lambda: not lives((tmp_path / "child").read_text().strip()))
+
+
+def test_a_program_its_children_and_its_frames_do_not_outlive_a_killed_run(tmp_path):
+    command = f"sh -c 'sleep 600 & echo $! $$ > {tmp_path}/started; wait'"
+    (tmp_path / "tmp").mkdir()
+    code = (
+        "import numpy as np\nfrom mskgrasp.planning.program_planner import ProgramPlanner\n"
+        "from tests.planning.hand_made import FRAME\nfrom tests.planning.workspaces import WORKSPACE\n"
+        f"ProgramPlanner({command!r}, WORKSPACE).plan(FRAME, np.random.default_rng(0))"
+    )
+    run = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"TMPDIR": str(tmp_path / "tmp")})
+    wait_until(lambda: run.poll() is not None or (tmp_path / "started").exists())
+    started = (tmp_path / "started").read_text().split()
+    wait_until(lambda: len(children(run.pid)) == 2)  # one of them cleans up
+    run.kill()
+    assert run.wait() == -signal.SIGKILL
+    wait_until(lambda: not any(map(lives, started)))
+    wait_until(lambda: not list((tmp_path / "tmp").iterdir()))
+
+
+def children(pid: int) -> list[str]:
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    """Wait for what another process does; one that is killed ends when it gets a turn."""
+    deadline = time.monotonic() + 30
+    while not true():
         assert time.monotonic() < deadline, "it goes on"
         time.sleep(0.05)
 
