@@ -8,10 +8,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pydantic import BaseModel
 from rich.console import Console
 
 from mskgrasp.core.files import write_whole
+from mskgrasp.palletize.config import PalletizeConfig
 from mskgrasp.palletize.figures import draw_corrections, draw_errors, draw_pallets, placement_text
 from mskgrasp.palletize.height_maps import read_height_maps
 from mskgrasp.palletize.pallet_slots import Slot
@@ -52,7 +52,7 @@ _DEFINITIONS = (
 
 
 def write_report(
-    config: BaseModel, out: Path, placements: Sequence[Placement], slots: Sequence[Slot]
+    config: PalletizeConfig, out: Path, placements: Sequence[Placement], slots: Sequence[Slot]
 ) -> PlacementSummary:
     """Summarise a run and write report.json, report.html and its figures.
 
@@ -74,7 +74,7 @@ def write_report(
     sections = [
         result_section(summary),
         errors,
-        _pallets(out, placements, slots),
+        _pallets(out, placements, slots, are_filled=config.slots is not None),
         _examples(out, placements),
         _parts(summary),
         _worst(out, placements),
@@ -163,9 +163,11 @@ def _ratio_text(ratio: float | None, interval: Interval | None) -> str:
     return text if interval is None else f"{text} ({_interval_text(interval, 1, digits=2)})"
 
 
-def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) -> Section:
-    """Images of whole pallets, side by side by correction; empty without pallets."""
-    figures = []
+def _pallets(
+    out: Path, placements: Sequence[Placement], slots: Sequence[Slot], *, are_filled: bool
+) -> Section:
+    """Images of whole pallets, side by side by correction, and which are missing; empty without pallets."""
+    figures, missing = [], []
     for number in sorted({one.number for one in placements}):
         images: dict[Correction, np.ndarray] = {}
         for name in CORRECTIONS:
@@ -173,6 +175,8 @@ def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) 
             image = cv2.imread(str(path)) if path.exists() else None
             if image is not None:
                 images[name] = image[..., ::-1]
+        tried = {one.correction for one in placements if one.number == number}
+        missing += [f"{number + 1} (correction {one})" for one in CORRECTIONS if one in tried - images.keys()]
         if images:
             path = out / f"pallet-{number:03d}.png"
             draw_pallets(images, slots, f"pallet {number + 1}", path)
@@ -180,7 +184,11 @@ def _pallets(out: Path, placements: Sequence[Placement], slots: Sequence[Slot]) 
                 f"Pallet {number + 1} from above. Green: targets, the longer arm along the part's longer side"
             )
             figures.append(Figure(path=path, caption=caption))
-    return Section(title="Pallets", figures=figures)
+    text = (
+        f"No picture of pallet {', '.join(missing)}: the run was stopped after the last placement, before it "
+        "was taken, or the hand hooked a part as it left."
+    )
+    return Section(title="Pallets", text=[text] if are_filled and missing else [], figures=figures)
 
 
 def _examples(out: Path, placements: Sequence[Placement]) -> Section:

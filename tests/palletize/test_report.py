@@ -75,6 +75,19 @@ def test_the_files_hold_the_summary_and_every_figure(run: tuple[Path, list[Place
     assert "10 of 11 placements succeeded; median error by correction: none 6.0 mm and 3.4 deg, pred" in page
 
 
+def test_a_pallet_without_a_picture_is_named(tmp_path):
+    (tmp_path / "placements").mkdir()
+    slots = [Slot(x=0.5, y=0.0, theta=1.0)]
+    done = [placement("a", 0, one, None, reason="slipped") for one in ("none", "predicted")]
+    picture = tmp_path / "placements" / "pallet-000-none.png"
+    cv2.imwrite(str(picture), np.full((120, 120, 3), 90, np.uint8))
+    write_report(PalletizeConfig(out=tmp_path, slots=Path("slots.yaml")), tmp_path, done, slots)
+    page = (tmp_path / "report.html").read_text()
+    assert "No picture of pallet 1 (correction predicted): the run was stopped after the last" in page
+    write_report(PalletizeConfig(out=tmp_path), tmp_path, done, slots)
+    assert "No picture" not in (tmp_path / "report.html").read_text()
+
+
 def test_the_worst_under_the_prediction_come_first_and_the_lost_with_their_reason(run):
     page = (run[0] / "report.html").read_text()
     worst = page[page.rindex("Worst placements") : page.rindex("Not placed or not measured")]
