@@ -48,9 +48,9 @@ class BenchmarkConfig(Config):
     """Folder of the networks of ours, ours-min-quality and certified; by default the shipped ones."""
     paper_models: Path | None = None
     """Folder of the paper's networks, trained with configs/train/paper.yaml."""
-    out: Path = Path("out/benchmark")
-    """Folder for report.html, report.json and trials.jsonl; with --grasps of what is written, by default
-    that of the file."""
+    out: Path | None = None
+    """Folder for report.html, report.json and trials.jsonl, or with --grasps for the scores. By default
+    out/benchmark, or with --grasps the folder of the file."""
     grasps: Path | None = None
     """Score the top-down grasps of a file in the isaac_grasp format instead, for --part."""
     part: str = ""
@@ -75,6 +75,11 @@ class BenchmarkConfig(Config):
         if self.part and self.grasps is None:
             raise ValueError("part is that of --grasps; parts to be grasped are named by --parts")
         return self
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the output."""
+        return self.out or (Path("out/benchmark") if self.grasps is None else self.grasps.parent)
 
     @property
     def n_trials(self) -> int:

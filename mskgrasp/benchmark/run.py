@@ -55,6 +55,7 @@ def benchmark(config: BenchmarkConfig) -> None:
         UsageError: A planner cannot run, the cell is not simulated, or the folder holds another run.
         MskgraspError: A part, a model or a planner cannot be used.
     """
+    config = config.model_copy(update={"out": config.folder})  # recorded as it is used
     check_planners(config)
     if not config.cell_file.is_file():
         raise UsageError(f"--cell is {config.cell!r}; legal: sapien, mujoco, or a cell's YAML file")
@@ -75,10 +76,10 @@ def benchmark(config: BenchmarkConfig) -> None:
     if config.program:
         inputs |= program_digests(config.program)
     inputs |= package_digests(config.rows)
-    with opened_run(config, config.out, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
+    with opened_run(config, config.folder, inputs, scene_version=SCENE_VERSION, may_change=_MAY_CHANGE):
         if "certified" in config.rows:
             certify_missing(sources, config.models, workers, clearance=cell.clearance)
-            keep_certified(config.out, sources)
+            keep_certified(config.folder, sources)
         trials = _trials(config, cell, sources, workers)
         facts = RunFacts(
             cell=config.cell,
@@ -90,9 +91,9 @@ def benchmark(config: BenchmarkConfig) -> None:
             known_families=known_families(config.rows, training, parts),
             settings=config.model_dump(mode="json"),
         )
-        headline, sections = write_report(config.out, trials, facts)
+        headline, sections = write_report(config.folder, trials, facts)
     print_sections(sections)
-    print(f"\n{headline}\nwrote {config.out}/report.html, report.json, trials.jsonl")
+    print(f"\n{headline}\nwrote {config.folder}/report.html, report.json, trials.jsonl")
 
 
 def _parts(config: BenchmarkConfig, training: dict) -> tuple[list[str], list[BenchmarkPart]]:
@@ -166,16 +167,16 @@ def _trials(
 ) -> list[PlacedTrial]:
     """All trials; those that are stored are not made again."""
     setup = BenchmarkSetup(
-        cell=cell.write(config.out),
+        cell=cell.write(config.folder),
         planners=PlannerSettings(
             models=config.models,
             paper_models=config.paper_models,
             program=config.program,
-            out=config.out,
+            out=config.folder,
         ),
         seed=config.seed,
     )
     tasks = scene_tasks(sources, cell.values["type"], config.n_trials, config.rows)
-    made = placed_trials(trial_bench, setup, tasks, config.out, workers)
+    made = placed_trials(trial_bench, setup, tasks, config.folder, workers)
     # Planner by planner, as the report lists them.
     return sorted(made, key=lambda trial: config.rows.index(trial.planner))

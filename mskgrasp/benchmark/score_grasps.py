@@ -15,7 +15,7 @@ from mskgrasp.core.displacement_covariance import (
     half_turned_displacement,
     object_displacement_covariance,
 )
-from mskgrasp.core.errors import NoPartFound, UsageError
+from mskgrasp.core.errors import NoPartFound, UsageError, printable
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import centre_in_grasp_frame, to_object_displacement
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
@@ -68,13 +68,12 @@ def score_file(config: BenchmarkConfig, path: Path) -> None:
         else:
             found[name] = grasp
     scores = score(part, models, found) if found else {}
-    folder = path.parent if config.out == BenchmarkConfig().out else config.out
-    make_folder(folder)
-    out = folder / f"{path.stem}.scored.yaml"
+    make_folder(config.folder)
+    out = config.folder / f"{path.stem}.scored.yaml"
     write_scored(out, read, scores)
     print(f"scored {len(scores)} of {len(read.T_mesh_tcp)} grasps of {part.name}")
     for name, one in sorted(scores.items(), key=lambda item: -item[1]["confidence"]):
-        print(f"  {name}: {_line(one)}")
+        print(f"  {printable(name)}: {_line(one)}")
     print(f"wrote {out}")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import yaml
@@ -73,6 +75,19 @@ def test_scores_are_written_beside_the_grasps_where_no_folder_is_named(tmp_path,
     assert done.returncode == 0, done.stderr
     assert {one.name for one in path.parent.iterdir()} == {"grasps.yaml", "grasps.scored.yaml"}
     assert not (tmp_path / "out").exists()  # where a benchmark without --out is refused beside other files
+
+
+def test_a_named_folder_is_used_and_a_name_does_not_control_the_terminal(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "grasps.yaml"
+    written(path, np.array(read_record(PART.folder)["centroid_in_source"]))
+    values = yaml.safe_load(path.read_text())
+    path.write_text(yaml.safe_dump(values | {"grasps": {"\x1b[2Jgood": values["grasps"]["good"]}}))
+    out = Path("out/benchmark")  # which is the default of a benchmark without --grasps
+    done = run_here(main, "--grasps", str(path), "--part", PART.name, "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert "  \\x1b[2Jgood: quality" in done.stdout and "\x1b" not in done.stdout
+    assert [one.name for one in out.iterdir()] == ["grasps.scored.yaml"]
 
 
 def test_grasps_of_a_pose_that_the_camera_does_not_see_are_left_out(tmp_path, capsys):
