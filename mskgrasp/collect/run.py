@@ -263,6 +263,7 @@ def is_done(
 
     Raises:
         BadDataset: The part, the simulation or the planner's model has changed since the shard was made.
+        OSError: The system cannot open or read it.
     """
     path = shard_path(out, task.part, task.index)
     if not path.exists():

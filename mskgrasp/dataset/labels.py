@@ -22,7 +22,7 @@ from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import object_displacement, pose_base_tcp
 from mskgrasp.dataset.attempts import COLUMNS, ShardInfo
 from mskgrasp.dataset.export import Watch, check_export_path, same_settings
-from mskgrasp.dataset.shards import DAMAGE, list_shards, read_columns, require_counts
+from mskgrasp.dataset.shards import DAMAGE, list_shards, raise_system_error, read_columns, require_counts
 
 _FORMAT = "mskgrasp-labels"
 LABELS_VERSION = 1
@@ -117,6 +117,7 @@ def read_labels(paths: Iterable[Path]) -> dict[tuple[str, int], ShardLabels]:
 
     Raises:
         BadDataset: A file is missing, foreign or damaged, or two hold the same shard.
+        OSError: The system cannot open or read one.
     """
     found: dict[tuple[str, int], ShardLabels] = {}
     for path in paths:
@@ -150,6 +151,7 @@ def _read(path: Path) -> list[ShardLabels]:
             for shard, start, end in zip(shards, ends[:-1], ends[1:], strict=True)
         ]
     except DAMAGE as error:
+        raise_system_error(error, path)
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(f"{path} is damaged or no file of labels ({problem})") from error
 

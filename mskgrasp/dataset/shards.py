@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -127,6 +128,7 @@ def read_shard(path: Path) -> tuple[Attempts, ShardInfo]:
 
     Raises:
         BadDataset: The file is missing, truncated, foreign, of another schema, or contradicts it.
+        OSError: The system cannot open or read it.
     """
     attempts, info = read_unchecked(path)
     _check(attempts, str(path))
@@ -138,6 +140,7 @@ def read_unchecked(path: Path) -> tuple[Attempts, ShardInfo]:
 
     Raises:
         BadDataset: The file is missing, truncated, foreign or of another schema.
+        OSError: The system cannot open or read it.
     """
     arrays, info = _read(path, tuple(COLUMNS))
     return Attempts(**arrays), info
@@ -149,6 +152,7 @@ def read_columns(path: Path, names: Sequence[str]) -> tuple[dict[str, np.ndarray
     Raises:
         BadDataset: The file is missing, truncated, foreign, of another schema, or an array has the wrong
             type or shape.
+        OSError: The system cannot open or read it.
     """
     arrays, info = _read(path, tuple(names))
     for problem in shape_problems(arrays):
@@ -161,6 +165,7 @@ def read_success(path: Path) -> tuple[np.ndarray, ShardInfo]:
 
     Raises:
         BadDataset: The file is missing, truncated, foreign or of another schema.
+        OSError: The system cannot open or read it.
     """
     arrays, info = read_columns(path, ("success",))
     return arrays["success"], info
@@ -182,10 +187,23 @@ def _read(path: Path, names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], Sh
     except BadDataset:
         raise
     except DAMAGE as error:
+        raise_system_error(error, path)
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(
             f"{path} is damaged or no HDF5 file ({problem}); delete it and collect again"
         ) from error
+
+
+def raise_system_error(error: Exception, path: Path) -> None:
+    """Raise an error of the operating system again, with the file's name: the file need not be damaged.
+
+    h5py gives errors of the system their number, and HDF5's own none.
+
+    Raises:
+        OSError: It is an error of the system.
+    """
+    if isinstance(error, OSError) and error.errno is not None:
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
 
 
 def _array(file: h5py.File, name: str) -> np.ndarray:

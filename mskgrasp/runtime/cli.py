@@ -43,12 +43,17 @@ def check_folder(path: Path) -> None:
 
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+_REMEDIES = {
+    **dict.fromkeys(_FULL, "free some space, what is finished is kept"),
+    **dict.fromkeys((errno.EMFILE, errno.ENFILE), "raise the limit of open files: ulimit -n 4096"),
+    **dict.fromkeys((errno.EIO, errno.ESTALE), "check the disk, then start again"),
+}
 
 
 def explain_os_error(error: OSError) -> str:
     """Explain an error in one line with the path and the remedy."""
     place = f": {error.filename}" if error.filename else ""
-    remedy = "free some space, what is finished is kept" if error.errno in _FULL else "choose another path"
+    remedy = _REMEDIES.get(error.errno or 0, "choose another path")
     return f"{error.strerror or error}{place}; {remedy}"
 
 

@@ -32,7 +32,7 @@ from mskgrasp.parts.write_solid import write_solid
 from mskgrasp.simulation.planned_grasps import planner_digest
 from mskgrasp.simulation.shard_task import ShardTask
 from tests.collecting import PARTS, REPOSITORY, arguments, assert_equal, collect, command
-from tests.programs import run_here
+from tests.programs import no_file_opens, run_here
 
 
 def test_a_run_leaves_shards_settings_summary_and_picture(collected):
@@ -226,6 +226,20 @@ def test_shards_of_other_software_are_not_added_to(collected, tmp_path):
         is_done(out, task, info.part_hash)
     with pytest.raises(BadDataset, match=r"made with random grasps, this run with planner 0123; .*--labels"):
         is_done(collected, task, info.part_hash, planner="0123")
+
+
+def test_a_shard_that_the_system_cannot_open_ends_the_run_and_is_not_made_again(collected):
+    path = list_shards(collected)[0]
+    info = read_shard(path)[1]
+    task = ShardTask(part=info.part, folder="", index=info.index, first=0, n=3, seed=info.seed)
+
+    def main() -> int:
+        with no_file_opens():
+            return int(is_done(collected, task, info.part_hash))
+
+    done = run_here(main)
+    remedy = "raise the limit of open files: ulimit -n 4096"
+    assert (done.returncode, done.stderr) == (1, f"program: Too many open files: {path}; {remedy}\n")
 
 
 def test_a_collection_from_labels_of_other_software_is_resumed_with_them(collected, tmp_path):

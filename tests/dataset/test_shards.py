@@ -16,8 +16,10 @@ from mskgrasp.dataset import (
     shard_path,
     write_shard,
 )
+from mskgrasp.dataset.labels import export_labels, read_labels
 from mskgrasp.dataset.shards import require_own_name
 from tests import synthetic
+from tests.programs import no_file_opens
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +136,15 @@ def test_foreign_files_are_reported(tmp_path):
         file["x"] = 1
     assert "no HDF5" in complaint(lambda: read_shard(text))
     assert "no grasp shard" in complaint(lambda: read_shard(other))
+
+
+def test_a_file_that_the_system_cannot_open_is_not_called_damaged(shard, tmp_path):
+    labels = tmp_path / "a.labels"
+    export_labels(tmp_path, labels)
+    for path, read in ((shard, read_shard), (labels, lambda path: read_labels([path]))):
+        with no_file_opens(), pytest.raises(OSError, match="^.Errno 24. Too many open files: ") as caught:
+            read(path)
+        assert caught.value.filename == str(path)
 
 
 def edit(path, change):
