@@ -206,9 +206,10 @@ class ValidateConfig(Config):
 
     def candidates(self) -> dict[str, tuple[int, int]]:
         """Rate and iterations of the grid's settings from which data may be collected, production's too."""
-        pairs = {(rate, count) for rate in self.rates_hz for count in self.iterations}
+        rates = [rate for rate in self.rates_hz if rate >= LEAST_RATE_HZ]
+        pairs = {(rate, count) for rate in rates for count in self.iterations}
         pairs.add((self.physics.rate_hz, self.physics.position_iterations))
-        return {setting_name(*pair): pair for pair in sorted(pairs) if pair[0] >= LEAST_RATE_HZ}
+        return {setting_name(*pair): pair for pair in sorted(pairs)}
 
     def settings(self) -> list[Setting]:
         """All that is simulated: production and its floor, references and floors, the grid, variants."""

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from mskgrasp.core.settings import Physics
 from mskgrasp.validate.config import DRAWN, NOMINAL, ValidateConfig
 from mskgrasp.validate.convergence import Convergence, measure_convergence
 from mskgrasp.validate.outcomes import Outcomes
@@ -33,6 +34,11 @@ def test_production_that_equals_its_references_fails_nothing():
     assert {one.setting for one in found.grid} == set(CONFIG.candidates())
     assert found.choice.shown and found.choice.production_fails == []
     assert found.impossible.attempts == found.size.n == 800
+
+
+def test_production_at_a_rate_at_which_no_data_is_collected_is_judged_too():
+    found = measured(CONFIG.model_copy(update={"physics": Physics(rate_hz=200)}))
+    assert found.production == "200 Hz, 50 it" in {one.setting for one in found.grid}
 
 
 def test_production_that_is_off_says_by_how_much():
