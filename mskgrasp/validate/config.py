@@ -11,7 +11,8 @@ import numpy as np
 import tyro
 from pydantic import Field, ValidationError, model_validator
 
-from mskgrasp.core.config import Config
+from mskgrasp.core.config import Config, check_config
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.settings import Physics
 from mskgrasp.core.settings.physics import LEAST_RATE_HZ
 
@@ -127,7 +128,8 @@ class ValidateConfig(Config):
     """Solver iterations of the grid."""
     variants: Annotated[dict[str, dict[str, dict[str, Value]]], tyro.conf.Suppress] = {}
     """Variants, by a group and a label for the table: values of physics settings, ``density`` (a
-    factor), ``hulls`` or ``rest`` (mesh). Each is compared with production on the same grasps."""
+    factor), ``hulls`` or ``rest`` (mesh). Each is compared with production on the same grasps; those that
+    lift at a higher rate than production's are left out."""
     ranges: Annotated[dict[str, tuple[float, float]], tyro.conf.Suppress] = {}
     """Physics settings of the hand and the table that are uncertain: drawn together, uniformly, for
     each grasp, they give the error of a label. The fingers' damping stays critical."""
@@ -182,7 +184,21 @@ class ValidateConfig(Config):
         for key, legal in (("hulls", HULLS), ("rest", RESTS)):
             if key in values and values[key] not in legal:
                 raise ValueError(f"variants: {name!r}: {key} must be one of {', '.join(legal)}")
-        self._variant(name, values)
+        if self._can_lift(values):
+            self._variant(name, values)
+
+    def _can_lift(self, values: dict[str, Value]) -> bool:
+        coarse = values.get("coarse_rate_hz")
+        return "rate_hz" in values or not isinstance(coarse, float) or coarse <= self.physics.rate_hz
+
+    def tried_variants(self) -> list[tuple[str, str, dict[str, Value]]]:
+        """Group, label and values of the variants, without those that lift at more than production's rate."""
+        return [
+            (group, label, values)
+            for group, labels in self.variants.items()
+            for label, values in labels.items()
+            if self._can_lift(values)
+        ]
 
     def at(self, rate_hz: int, iterations: int) -> Physics:
         """The settings under test at another rate and other iterations."""
@@ -237,8 +253,9 @@ class ValidateConfig(Config):
         pairs -= {(self.physics.rate_hz, self.physics.position_iterations)}
         n = self.n_of(self.references[0])
         found += [Setting(name=setting_name(*pair), physics=self.at(*pair), n=n) for pair in sorted(pairs)]
-        for group, labels in self.variants.items():
-            found += [self._variant(variant_name(group, label), labels[label]) for label in labels]
+        found += [
+            self._variant(variant_name(group, label), own) for group, label, own in self.tried_variants()
+        ]
         if self.ranges:
             found.append(Setting(name=DRAWN, physics=self.physics, n=self.n_variants, ranges=self.ranges))
         return found
@@ -246,7 +263,7 @@ class ValidateConfig(Config):
     def _variant(self, name: str, values: dict[str, Value]) -> Setting:
         own: dict[str, Any] = {key: values[key] for key in ("density", "hulls", "rest") if key in values}
         physics = self.physics.model_dump() | {key: values[key] for key in values.keys() - own.keys()}
-        return Setting(name=name, physics=Physics.model_validate(physics), n=self.n_variants, **own)
+        return Setting(name=name, physics=_physics(physics, f"variants: {name!r}"), n=self.n_variants, **own)
 
     def engines(self) -> list[Setting]:
         """The settings under test in both engines, and in each with the starts moved by 0.1 mm."""
@@ -262,6 +279,13 @@ class ValidateConfig(Config):
 
 
 SHIFTED = ", starts moved by 0.1 mm"
+
+
+def _physics(values: dict[str, Any], source: str) -> Physics:
+    try:
+        return check_config(Physics, values, source)
+    except BadConfig as error:
+        raise ValueError(str(error)) from None
 
 
 def drawn_physics(

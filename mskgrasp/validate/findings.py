@@ -197,8 +197,7 @@ def sensitivity(config: ValidateConfig, outcomes: Mapping[str, Outcomes]) -> lis
     """Every variant against production; before them production with its starts moved."""
     n, nominal = config.n_variants, outcomes[NOMINAL]
     names = [("start", "moved by 10 um", MOVED)]
-    for group, labels in config.variants.items():
-        names += [(group, label, variant_name(group, label)) for label in labels]
+    names += [(group, label, variant_name(group, label)) for group, label, _ in config.tried_variants()]
     found = []
     for group, label, name in names:
         own = _first(outcomes[name], n)

@@ -23,7 +23,7 @@ from mskgrasp.validate.altered_part import altered_part
 from mskgrasp.validate.body_scene import BodyScene
 from mskgrasp.validate.check import Check
 from mskgrasp.validate.closed_form import run_checks
-from mskgrasp.validate.config import Setting, ValidateConfig
+from mskgrasp.validate.config import Setting, ValidateConfig, variant_name
 from mskgrasp.validate.convergence import measure_convergence
 from mskgrasp.validate.engines import compare_engines
 from mskgrasp.validate.equivalence import LEAST_PARTS
@@ -94,6 +94,10 @@ def _simulate(config: ValidateConfig, parts: list[Part]) -> dict[str, Outcomes]:
     workers = process_count(config.workers)
     folders = [part.folder for part in parts]
     settings = config.settings()
+    tried = {setting.name for setting in settings}
+    for name in (variant_name(group, label) for group, labels in config.variants.items() for label in labels):
+        if name not in tried:
+            note(f"left out {name!r}: it lifts at more than production's rate, {config.physics.rate_hz} Hz")
     n = len(parts) * config.grasps_per_part
     with progress(total=n, title="drawing grasps", unit="grasp") as bar:
         drawn = draw_grasps(

@@ -11,6 +11,7 @@ from mskgrasp.collect.config import CollectConfig, PartFilter
 from mskgrasp.core.config import read_config
 from mskgrasp.core.settings import ExecutionNoise, Physics
 from mskgrasp.core.shipped import config_file
+from mskgrasp.runtime.options import parse
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,3 +82,12 @@ def test_the_paper_s_settings_are_those_of_the_paper():
 def test_settings_that_would_make_wrong_or_unreadable_data_are_refused(values: dict, message: str):
     with pytest.raises(ValidationError, match=message):
         CollectConfig.model_validate(values)
+
+
+@pytest.mark.parametrize(
+    ("words", "coarse"),
+    [("--physics.rate-hz 400", 400), ("--physics.rate-hz 400 --physics.coarse-rate-hz 250", 250)],
+)
+def test_the_coarse_rate_follows_a_lower_rate_of_the_command_line(words: str, coarse: int):
+    config = parse(CollectConfig, prog="p", description="d", argv=words.split())
+    assert (config.physics.rate_hz, config.physics.coarse_rate_hz) == (400, coarse)

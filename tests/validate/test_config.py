@@ -12,6 +12,7 @@ from mskgrasp.core.config import check_config, read_config
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.settings import Physics
 from mskgrasp.parts import find_part
+from mskgrasp.runtime.options import parse
 from mskgrasp.validate.config import (
     MOVED,
     NOMINAL,
@@ -102,9 +103,18 @@ def test_variants_are_tried_beside_the_grid():
     assert heavy.density == 2.0 and heavy.physics == config.physics
 
 
+def test_variants_that_lift_faster_than_production_are_left_out_and_the_others_tried():
+    file = REPOSITORY / "configs" / "validate" / "default.yaml"
+    words = ["--config", str(file), "--physics.rate-hz", "500"]
+    names = settings_of(parse(ValidateConfig, prog="p", description="d", argv=words))
+    assert "engine: lift at 250 Hz" in names and "engine: lift at 1000 Hz" not in names
+    assert "engine: lift at 1000 Hz" in settings_of(read_config(ValidateConfig, file))
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
+        ({"rate_hz": 300, "coarse_rate_hz": 400}, "variants: 'group: typo': coarse_rate_hz is at most"),
         ({"pad_radius": 0.008}, "no setting of physics"),
         ({"hulls": "coarse"}, "hulls must be one of exact"),
         ({"rest": "drawing"}, "rest must be one of hulls, mesh"),

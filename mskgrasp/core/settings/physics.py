@@ -23,9 +23,10 @@ class Physics(Config):
     fingers, and no data is collected."""
     coarse_rate_hz: int = Field(default=500, ge=100)
     """Steps a second, at most ``rate_hz``, during lift and hold, and while a part that is not held comes to
-    rest. The first 6 mm of the lift, in which the part leaves the table, and the last 20 ms before the part's
-    pose in the hand is measured use ``rate_hz``, as does the simulated cell (`hal.sim`) unless nothing can
-    touch its hand. At 250 Hz parts swing in the hand, by up to 13 degrees more than at 1000 Hz."""
+    rest; its default is lowered with ``rate_hz``. The first 6 mm of the lift, in which the part leaves the
+    table, and the last 20 ms before the part's pose in the hand is measured use ``rate_hz``, as does the
+    simulated cell (`hal.sim`) unless nothing can touch its hand. At 250 Hz parts swing in the hand, by up to
+    13 degrees more than at 1000 Hz."""
     position_iterations: int = Field(default=50, ge=4)
     """Solver iterations a step; `validate` compares them."""
     hold_iterations: int = Field(default=50, ge=4)
@@ -79,9 +80,10 @@ class Physics(Config):
     @model_validator(mode="before")
     @classmethod
     def _coarse_rate_follows(cls, values: Any) -> Any:
-        # rate_hz may be lowered alone; coarse_rate_hz is then lowered with it.
-        if isinstance(values, dict) and "coarse_rate_hz" not in values:
-            rate, usual = values.get("rate_hz"), cls.model_fields["coarse_rate_hz"].default
+        # rate_hz may be lowered alone. The default counts as not stated: a command line states every value.
+        usual = cls.model_fields["coarse_rate_hz"].default
+        if isinstance(values, dict) and values.get("coarse_rate_hz", usual) == usual:
+            rate = values.get("rate_hz")
             if isinstance(rate, int) and rate < usual:
                 return values | {"coarse_rate_hz": rate}
         return values

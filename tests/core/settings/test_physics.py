@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from mskgrasp.core.settings import Physics
 
 
-def test_the_coarse_rate_follows_a_lower_rate_unless_it_is_stated():
+def test_the_coarse_rate_follows_a_lower_rate_unless_another_is_stated():
     assert Physics().coarse_rate_hz == 500
     assert Physics(rate_hz=125).coarse_rate_hz == 125 and Physics(rate_hz=2000).coarse_rate_hz == 500
     assert Physics(rate_hz=200, coarse_rate_hz=100).coarse_rate_hz == 100
