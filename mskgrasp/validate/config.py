@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -152,11 +153,13 @@ class ValidateConfig(Config):
             raise ValueError(
                 "rates_hz, iterations and references need at least one value each: --rates-hz 500 1000"
             )
-        for rate in self.rates_hz:
+        for rate, count in itertools.product(self.rates_hz, self.iterations):
             try:
-                self.at(rate, self.iterations[0])
+                self.at(rate, count)
             except ValidationError as error:
-                raise ValueError(f"rates_hz: {rate} Hz: {error.errors()[0]['msg'].lower()}") from None
+                first = error.errors()[0]
+                what = f"rates_hz: {rate} Hz" if first["loc"] == ("rate_hz",) else f"iterations: {count}"
+                raise ValueError(f"{what}: {first['msg'].lower()}") from None
         finest = (max(*self.rates_hz, self.physics.rate_hz), self._most_iterations)
         for reference in self.references:
             if reference.rate_hz <= finest[0] or reference.position_iterations <= finest[1]:
@@ -171,6 +174,8 @@ class ValidateConfig(Config):
             known = Physics.model_fields.get(name)
             if known is None or known.annotation is not float or not low <= high:
                 raise ValueError(f"ranges: {name} must be a real-valued setting of physics, from low to high")
+            for bound in (low, high):
+                _physics(self.physics.model_dump() | {name: bound}, "ranges")
         return self
 
     @property
@@ -184,6 +189,9 @@ class ValidateConfig(Config):
         for key, legal in (("hulls", HULLS), ("rest", RESTS)):
             if key in values and values[key] not in legal:
                 raise ValueError(f"variants: {name!r}: {key} must be one of {', '.join(legal)}")
+        density = values.get("density", 1.0)
+        if not isinstance(density, float) or density <= 0:
+            raise ValueError(f"variants: {name!r}: density must be a factor above 0, got {density!r}")
         if self._can_lift(values):
             self._variant(name, values)
 

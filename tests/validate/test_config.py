@@ -118,16 +118,25 @@ def test_variants_that_lift_faster_than_production_are_left_out_and_the_others_t
         ({"pad_radius": 0.008}, "no setting of physics"),
         ({"hulls": "coarse"}, "hulls must be one of exact"),
         ({"rest": "drawing"}, "rest must be one of hulls, mesh"),
+        ({"density": "half"}, "density must be a factor above 0, got 'half'"),
+        ({"density": -1}, "density must be a factor above 0, got -1.0"),
+        ({"density": True}, "density must be a factor above 0, got True"),
+        (
+            {"finger_force": 90.0},
+            "variants: 'group: typo': 'finger_force': input should be less than .* 90.0$",
+        ),
     ],
 )
 def test_variants_that_name_nothing_are_refused(values, message):
-    with pytest.raises(ValueError, match=message):
-        ValidateConfig(variants={"group": {"typo": values}})
+    with pytest.raises(BadConfig, match=message):
+        check_config(ValidateConfig, {"variants": {"group": {"typo": values}}}, "file")
 
 
 def test_a_rate_that_no_simulation_has_is_refused_by_the_name_of_its_option():
     with pytest.raises(ValidationError, match=r"rates_hz: 10 Hz: input should be greater than or equal to"):
         ValidateConfig(rates_hz=(10, 500))
+    with pytest.raises(ValidationError, match=r"iterations: 2: input should be greater than or equal to 4"):
+        ValidateConfig(iterations=(25, 2))
 
 
 def test_empty_lists_are_refused():
@@ -142,6 +151,19 @@ def test_empty_lists_are_refused():
 def test_ranges_of_what_cannot_be_drawn_are_refused(ranges):
     with pytest.raises(ValueError, match=f"ranges: {next(iter(ranges))} must be a real-valued setting"):
         ValidateConfig(ranges=ranges)
+
+
+@pytest.mark.parametrize(
+    ("name", "bounds", "got"),
+    [
+        ("finger_force", (30, 90), "90.0"),
+        ("lift_height", (0, 0.1), "0.0"),
+        ("finger_armature", (-1, 1), "-1.0"),
+    ],
+)
+def test_ranges_beyond_what_physics_accepts_are_refused(name, bounds, got):
+    with pytest.raises(BadConfig, match=f"ranges: '{name}': input should be .*, got {got}$"):
+        check_config(ValidateConfig, {"ranges": {name: bounds}}, "file")
 
 
 def test_a_table_without_friction_is_refused_where_parts_slide_on_it():
