@@ -58,8 +58,7 @@ def compare_engines(config: ValidateConfig, parts: Sequence[Part]) -> int:
         for name in ("sapien", "mujoco")
     }
     by_part = {
-        part.name: compare_outcomes(*(_of(one, part.folder.name) for one in (mujoco, sapien)))
-        for part in parts
+        part.name: compare_outcomes(*(_of(one, part.name) for one in (mujoco, sapien))) for part in parts
     }
     differing = disagreements(mujoco, sapien)
     failed = complaints(rows["all"])

@@ -77,10 +77,12 @@ class Drawn:
     """A part and the grasps that were drawn for it.
 
     Attributes:
+        part: The part's name.
         folder: The part's folder.
         file: npz with ``pose`` (n, 7), ``T_base_obj`` at the start, and ``grasp`` (n, 4), base frame.
     """
 
+    part: str
     folder: Path
     file: Path
 
@@ -98,7 +100,7 @@ def draw_grasps(
     for folder in folders:
         part = read_part(folder)
         name = f"{part.name}-{part.content_hash[:12]}-{SIMULATION_VERSION}-{seed}-{n}.npz"
-        drawn.append(Drawn(folder=folder, file=out / "grasps" / name))
+        drawn.append(Drawn(part=part.name, folder=folder, file=out / "grasps" / name))
     jobs = [(str(one.folder), n, seed, str(one.file)) for one in drawn if not one.file.exists()]
     _in_parallel(_draw, jobs, workers, report)
     return drawn
@@ -153,7 +155,7 @@ def _trials(
 ) -> list[_Trial]:
     found = []
     for one in drawn:
-        folder = one.folder if altered is None else altered.get(one.folder.name)
+        folder = one.folder if altered is None else altered.get(one.part)
         if folder is not None:
             file = _outcome_file(out, setting, one, folder)
             found.append(_Trial(setting=setting, drawn=one, folder=folder, file=file))
@@ -228,7 +230,7 @@ def _try_grasps(trial: _Trial, file: Path) -> int:
     for k, (pose, grasp) in enumerate(zip(poses, grasps, strict=True)):
         if setting.ranges:
             made.close()
-            rng = np.random.default_rng([zlib.crc32(trial.drawn.folder.name.encode()), k])
+            rng = np.random.default_rng([zlib.crc32(trial.drawn.part.encode()), k])
             physics = drawn_physics(setting.physics, setting.ranges, rng)
             made, env = _make_env(str(trial.folder), physics, "none")
         if setting.hulls:
@@ -277,7 +279,7 @@ def _read(trials: Sequence[_Trial]) -> Outcomes:
         for name in (*KEPT, "cpu_seconds"):
             pieces[name].append(stored[name])
         n = len(stored["success"])
-        pieces["part"].append(np.repeat(trial.drawn.folder.name, n))
+        pieces["part"].append(np.repeat(trial.drawn.part, n))
         pieces["index"].append(np.arange(n))
     if not trials:
         return Outcomes(**{name: np.zeros((0, 4) if name == "displacement" else 0, bool) for name in pieces})

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UsageError
 from mskgrasp.core.files import write_whole
 from mskgrasp.core.json_text import finite
 from mskgrasp.parts import Part, chosen_names, find_part
@@ -38,10 +39,14 @@ def validate(config: ValidateConfig) -> int:
 
     Raises:
         DriverMissing: A second engine is to be compared and is not installed.
+        UsageError: Two parts have the same name.
     """
     check_folder(config.out)
     names = chosen_names(config.parts or ("starter",))
     parts = [find_part(name) for name in progress(names, title="parts", unit="part")]
+    counts = Counter(part.name for part in parts)
+    for twice in (part for part in parts if counts[part.name] > 1):
+        raise UsageError(f"--parts: two parts are called {twice.name!r}; leave one out")
     make_folder(config.out)
     if config.engine == "mujoco":
         return compare_engines(config, parts)
@@ -124,7 +129,7 @@ def _altered(folder: Path, settings: Sequence[Setting], parts: Sequence[Part]) -
                 note(f"left out of {setting.name!r}: {error}")
                 continue
             if setting.density != 1 or not _same_hulls(part, altered):
-                own[part.folder.name] = altered.folder
+                own[part.name] = altered.folder
     return found
 
 

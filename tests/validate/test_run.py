@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
 
+from mskgrasp.parts import find_part
 from mskgrasp.validate.__main__ import main
+from mskgrasp.validate.config import ValidateConfig
+from mskgrasp.validate.run import _altered
 from tests.programs import run_here
 
 
@@ -41,3 +45,18 @@ def test_an_output_folder_that_cannot_be_made_is_reported_before_any_part_is_loo
     (tmp_path / "file").write_text("in the way")
     done = run_here(main, "--parts", "no_such_part", "--out", str(tmp_path / "file" / "out"))
     assert done.returncode == 2 and "file is a file; choose another --out" in done.stderr
+
+
+def test_two_parts_of_one_name_are_refused_before_anything_is_simulated(tmp_path):
+    copy = shutil.copytree(find_part("hex_nut_m20").folder, tmp_path / "copy")
+    done = run_here(main, "--parts", "hex_nut_m20", str(copy), "--out", str(tmp_path / "out"))
+    assert done.returncode == 2
+    assert done.stderr.endswith("--parts: two parts are called 'hex_nut_m20'; leave one out\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_parts_in_folders_of_one_name_are_told_apart(tmp_path):
+    names = ("hex_nut_m20", "hex_nut_m30")
+    parts = [find_part(shutil.copytree(find_part(n).folder, tmp_path / n / "nut")) for n in names]
+    settings = ValidateConfig(variants={"density": {"double": {"density": 2.0}}}).settings()
+    assert set(_altered(tmp_path / "altered", settings, parts)["density: double"]) == set(names)
