@@ -161,11 +161,9 @@ def _table(attempts: Attempts, info: ShardInfo, schema: pyarrow.Schema, path: Pa
     for name, column in COLUMNS.items():
         if name not in values:
             rows = getattr(attempts, name)
-            missing = (
-                np.isnan(rows).any(axis=tuple(range(1, rows.ndim)))
-                if column.dtype == "float32"
-                else np.zeros(n)
-            )
+            missing = np.zeros(n, bool) if column.finite != "successful" else ~attempts.success
+            if column.dtype == "float32":
+                missing = missing | np.isnan(rows).any(axis=tuple(range(1, rows.ndim)))
             values[name] = [None if gone else row.tolist() for row, gone in zip(rows, missing, strict=True)]
     return pa.Table.from_pydict(values, schema=schema)
 

@@ -15,6 +15,7 @@ import yaml
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.grasp import FAILURES
 from mskgrasp.dataset import Attempts, list_shards, read_shard, write_shard
+from mskgrasp.dataset.attempts import COLUMNS
 from mskgrasp.dataset.commands.command_line import main
 from mskgrasp.dataset.parquet import export_parquet
 
@@ -34,6 +35,9 @@ def test_parquet_holds_every_column_with_units_images_and_a_card(collected, join
         elif name == "failure":
             assert rows == [FAILURES[code] for code in values]
         else:
+            if COLUMNS[name].finite == "successful":
+                assert [row is None for row in rows] == list(~joined.success), name
+                values = np.where(joined.success.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
             empty = np.full(values.shape[1:], np.nan)
             found = np.array([empty if row is None else row for row in rows], values.dtype)
             assert np.array_equal(found, values, equal_nan=values.dtype.kind == "f"), name
