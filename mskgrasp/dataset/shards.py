@@ -249,9 +249,9 @@ def _read_info(file: h5py.File) -> ShardInfo:
     if not (intrinsics[0, 0] > 0 and intrinsics[1, 1] > 0 and np.array_equal(intrinsics[2], [0, 0, 1])):
         raise ValueError("intrinsics are those of no pinhole camera")
     return ShardInfo(
-        part=str(attrs["part"]),
-        part_hash=str(attrs["part_hash"]),
-        family=str(attrs["family"]),
+        part=_text(attrs["part"]),
+        part_hash=_text(attrs["part_hash"]),
+        family=_text(attrs["family"]),
         index=int(attrs["index"]),
         seed=int(attrs["seed"]),
         intrinsics=intrinsics,
@@ -263,11 +263,19 @@ def _read_info(file: h5py.File) -> ShardInfo:
         discarded=require_counts(_mapping(attrs, "discarded", int)),
         redrawn=int(attrs.get("redrawn", 0)),
         toppled=float(attrs.get("toppled", 0.0)),
-        fidelity=str(attrs.get("fidelity", "cpu")),
+        fidelity=_text(attrs.get("fidelity", "cpu")),
         hand=_mapping(attrs, "hand") if "hand" in attrs else {},
         noise=_mapping(attrs, "noise") if "noise" in attrs else {},
-        planner=str(attrs.get("planner", "")),
+        planner=_text(attrs.get("planner", "")),
     )
+
+
+def _text(value: Any) -> str:
+    text = str(value)
+    # h5py hands on bytes that are no UTF-8 as surrogates, which no export can write.
+    if text.encode(errors="ignore").decode() != text:
+        raise ValueError(f"the text {text!r} is not UTF-8")
+    return text
 
 
 def _mapping(attrs: dict[str, Any], name: str, kind: type = object) -> dict[str, Any]:

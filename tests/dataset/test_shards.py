@@ -195,6 +195,12 @@ def test_an_array_that_claims_to_be_enormous_is_reported_and_not_read(shard):
     assert "tilt claims the shape (1000000000000,)" in complaint(lambda: read_shard(shard))
 
 
+@pytest.mark.parametrize("name", ["part", "family", "planner"])
+def test_an_attribute_that_is_no_text_is_reported(shard, name):
+    edit(shard, lambda file: file.attrs.__setitem__(name, b"a\xff"))
+    assert r"(the text 'a\udcff' is not UTF-8); delete it" in complaint(lambda: read_shard(shard))
+
+
 def test_an_attribute_that_is_no_object_is_reported(shard):
     edit(shard, lambda file: file.attrs.__setitem__("discarded", "[1]"))
     assert "discarded is no JSON object" in complaint(lambda: read_shard(shard))
