@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from mskgrasp.core.config import Config
 
-NoiseModel = Literal["off", "iid", "kinect2"]
+NoiseModel = Annotated[
+    Literal["off", "iid", "kinect2"],
+    BeforeValidator(lambda value: "off" if value is False else value),  # YAML reads a bare `off` as false
+]
 
 
 class SensorNoise(Config):
@@ -35,9 +38,7 @@ class SensorNoise(Config):
     @model_validator(mode="before")
     @classmethod
     def _by_name(cls, values: Any) -> Any:
-        if values is False:  # YAML reads a bare `off` as false
-            return {"model": "off"}
-        return {"model": values} if isinstance(values, str) else values
+        return {"model": values} if isinstance(values, str | bool) else values
 
     @model_validator(mode="after")
     def _check(self) -> SensorNoise:

@@ -3,7 +3,9 @@ from pathlib import Path
 import pytest
 
 from mskgrasp.benchmark.config import BUILT_IN, BenchmarkConfig
+from mskgrasp.core.config import read_config
 from mskgrasp.core.errors import BadConfig
+from mskgrasp.evaluate.config import EvaluateConfig
 from mskgrasp.runtime.options import parse
 
 
@@ -34,3 +36,15 @@ def test_a_cell_is_one_of_two_names_or_a_file():
 def test_a_planner_named_twice_is_refused():
     with pytest.raises(BadConfig, match="named twice"):
         parsed("--planners", "ours", "ours")
+
+
+def test_noise_can_be_switched_off_in_a_file_and_on_the_command_line(tmp_path: Path):
+    """YAML reads a bare ``off`` as false."""
+    file = tmp_path / "settings.yaml"
+    file.write_text("noise: off\n")
+    for config in (
+        parsed("--config", str(file)),
+        parsed("--noise", "off"),
+        read_config(EvaluateConfig, file),
+    ):
+        assert config.noise == "off"

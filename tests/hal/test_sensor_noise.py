@@ -124,6 +124,7 @@ class Camera(Config):
         ({"noise": False}, "off"),
         ({"noise": "kinect2"}, "kinect2"),
         ({"noise": {"model": "iid"}}, "iid"),
+        ({"noise": {"model": False}}, "off"),
     ],
 )
 def test_a_cells_file_names_the_model_alone_or_with_its_settings(values: dict[str, Any], model: str):
