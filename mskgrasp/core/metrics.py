@@ -143,7 +143,7 @@ def bootstrap_interval(
     few objects of which some are far worse than others is still covered less often than the level says.
 
     Args:
-        values: One array (n_i, ...) of samples for each object.
+        values: One array (n_i, ...) of samples for each object; one without samples is left out.
         statistic: Function of the concatenated samples of the drawn objects.
         level: Confidence level.
         repeats: Number of draws.
@@ -153,6 +153,7 @@ def bootstrap_interval(
         The interval; NaN, NaN of fewer than two objects, which do not show how objects differ, and where the
         statistic is NaN in every draw.
     """
+    values = [one for one in values if len(one)]
     if len(values) < 2:
         return float("nan"), float("nan")
     rng = np.random.default_rng(seed)
@@ -177,13 +178,14 @@ def rms_interval(errors: Sequence[np.ndarray], level: float = 0.95) -> tuple[flo
     them: ``python -m tests.benchmarks.interval_coverage``.
 
     Args:
-        errors: (n_i,) errors of each cluster, at least one.
+        errors: (n_i,) errors of each cluster; one without errors is left out.
         level: Confidence level.
 
     Returns:
         The interval; None of fewer than three clusters, and where a single one has all errors: they bound
         nothing.
     """
+    errors = [one for one in errors if len(one)]
     k = len(errors)
     if k < 3:
         return None
@@ -256,14 +258,15 @@ def share_interval(n_success: np.ndarray, n: np.ndarray, level: float = 0.95) ->
 
     Args:
         n_success: (k,) successes of each cluster.
-        n: (k,) its trials, at least one.
+        n: (k,) its trials; a cluster without any is left out.
         level: Confidence level.
 
     Returns:
-        The interval over all clusters that might be drawn. That of a single cluster, which cannot show how
-        clusters differ, is Wilson's interval of this cluster.
+        The interval over all clusters that might be drawn; 0, 1 of no trial. That of a single cluster, which
+        cannot show how clusters differ, is Wilson's interval of this cluster.
     """
     won, tried = np.asarray(n_success, dtype=np.float64), np.asarray(n, dtype=np.float64)
+    won, tried = won[tried > 0], tried[tried > 0]
     total = float(tried.sum())
     share = float(won.sum()) / total if total else 0.0
     if len(won) < 2:

@@ -57,7 +57,18 @@ def test_wilson_interval_agrees_with_scipy(k, n):
 
 def test_no_trial_tells_nothing():
     assert wilson_interval(0, 0) == (0.0, 1.0)
-    assert share_interval(np.zeros(0), np.zeros(0)) == (0.0, 1.0)
+    for k in range(4):
+        assert share_interval(np.zeros(k), np.zeros(k)) == (0.0, 1.0)
+
+
+def test_a_cluster_without_trials_changes_no_interval():
+    won, tried = np.array([3, 5, 1]), np.array([4, 5, 6])
+    assert share_interval(np.append(won, 0), np.append(tried, 0)) == share_interval(won, tried)
+    assert share_interval(np.array([7, 0]), np.array([9, 0])) == wilson_interval(7, 9)
+    errors = [np.array([1e-3, 2e-3]), np.array([4e-3]), np.array([3e-3, 1e-3])]
+    for found in (metrics.rms_interval, lambda given: metrics.bootstrap_interval(given, np.mean, repeats=50)):
+        assert found([*errors, np.zeros(0)]) == found(errors)
+    assert metrics.rms_interval([np.zeros(0)] * 4) is None
 
 
 def test_clusters_that_are_all_or_nothing_count_as_one_trial_each():

@@ -74,10 +74,9 @@ def _report(index: Index, low: float, high: float) -> None:
         if not rated:
             continue
         n, won = sum(r.attempts for r in rated), sum(r.successes for r in rated)
-        tried = [r for r in rated if r.attempts]
         # By parts: grasps of one part are alike.
         interval = share_interval(
-            np.array([r.successes for r in tried]), np.array([r.attempts for r in tried])
+            np.array([r.successes for r in rated]), np.array([r.attempts for r in rated])
         )
         rows.append((
             family, len(entries), len(rated), n, f"{won / max(n, 1):.0%}",
