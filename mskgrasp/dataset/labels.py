@@ -34,7 +34,8 @@ _DIGITS = {
 _EXACT = ("grasp", "failure", "attempt", "draw")
 _OWN = ("part", "part_hash", "family", "index", "seed", "discarded", "redrawn", "toppled")
 """Properties in which shards of a dataset differ."""
-_MOST_ROWS = 2**26
+_MOST_BYTES = 2**31
+"""Largest plausible array: the poses of 2**26 attempts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,8 +137,13 @@ def _read(path: Path) -> list[ShardLabels]:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != _FORMAT or file.attrs.get("version") != LABELS_VERSION:
                 raise ValueError("it holds no labels of this version")
-            shared, shards = (json.loads(_array(file, name).tobytes()) for name in ("shared", "shards"))
-            arrays = {name: _array(file, name) for name in (*_EXACT, *_DIGITS)}
+            shared, shards = (
+                json.loads(_array(file, name, "uint8", ()).tobytes()) for name in ("shared", "shards")
+            )
+            arrays = {
+                name: _array(file, name, COLUMNS[name].dtype, COLUMNS[name].shape)
+                for name in (*_EXACT, *_DIGITS)
+            }
         counts = [int(shard.pop("n")) for shard in shards]
         if min(counts, default=0) < 0 or any(len(values) != sum(counts) for values in arrays.values()):
             raise ValueError("its arrays do not fit its shards")
@@ -150,19 +156,23 @@ def _read(path: Path) -> list[ShardLabels]:
             )
             for shard, start, end in zip(shards, ends[:-1], ends[1:], strict=True)
         ]
-    except DAMAGE as error:
+    except (*DAMAGE, MemoryError) as error:
         raise_system_error(error, path)
         problem = " ".join(str(error).split()).strip("'\"")
         raise BadDataset(f"{path} is damaged or no file of labels ({problem})") from error
 
 
-def _array(file: h5py.File, name: str) -> np.ndarray:
+def _array(file: h5py.File, name: str, dtype: str, row: tuple[int, ...] | None) -> np.ndarray:
     stored = file[name]
     link = file.get(name, getlink=True)
     if not isinstance(stored, h5py.Dataset) or not isinstance(link, h5py.HardLink):
         raise ValueError(f"{name} is no array of its own")
-    if stored.external or stored.is_virtual or (stored.size or 0) > 7 * _MOST_ROWS:
-        raise ValueError(f"{name} lies elsewhere, or claims the shape {stored.shape}")
+    if stored.external or stored.is_virtual:
+        raise ValueError(f"{name} lies in another file")
+    # A damaged file can claim any size: it is bounded before anything is allocated.
+    fits = stored.dtype.kind == np.dtype(dtype).kind and stored.shape[1:] == row
+    if not fits or stored.size * stored.dtype.itemsize > _MOST_BYTES:
+        raise ValueError(f"{name} claims the type {stored.dtype} and the shape {stored.shape}")
     return np.asarray(stored)
 
 

@@ -138,6 +138,22 @@ def test_a_damaged_shard_is_an_error_of_one_line(folder: Path, tmp_path: Path, c
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("shape", "dtype"),
+    [((4 * 10**8,), "S100000"), ((10**9, 4), "f4"), ((80, 5), "f4"), ((80, 4), "i4"), ((80,), "f4")],
+)
+def test_an_array_of_another_type_or_size_is_refused_unread(
+    folder: Path, tmp_path: Path, shape: tuple[int, ...], dtype: str
+):
+    out = tmp_path / "boxes.labels"
+    export_labels(folder, out)
+    with h5py.File(out, "r+") as file:
+        del file["grasp"]
+        file.create_dataset("grasp", shape=shape, dtype=dtype, chunks=True)
+    with pytest.raises(BadDataset, match=r"boxes\.labels is damaged .*grasp claims the type"):
+        read_labels([out])
+
+
 def test_an_array_in_another_file_is_refused(folder: Path, tmp_path: Path):
     out = tmp_path / "boxes.labels"
     export_labels(folder, out)
