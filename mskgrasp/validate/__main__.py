@@ -10,7 +10,8 @@ DESCRIPTION = """Shows whether simulated labels are right: run it after changing
 Three kinds of evidence: experiments whose outcome follows from closed-form physics; parts as the engine
 cooked them, against their meshes; and the same grasps under finer references, coarser settings and other
 values of what is not known exactly. Production must be equivalent to the reference by two one-sided tests.
-Writes validate.json and validate.png; ends with 1 if a check fails or the equivalence is not shown.
+Writes validate.json and validate.png; ends with 1 if a check fails or the equivalence is not shown. Fewer
+than ten parts cannot show it: a note says so, and only the checks count.
 
 The checks alone: python -m mskgrasp.validate --no-convergence"""
 
