@@ -170,6 +170,8 @@ class ValidateConfig(Config):
         for group, labels in self.variants.items():
             for label, values in labels.items():
                 self._check_variant(f"{group}: {label}", values)
+        if "finger_damping" in self.ranges:
+            raise ValueError("ranges: finger_damping is not drawn, it stays critical; draw finger_stiffness")
         for name, (low, high) in self.ranges.items():
             known = Physics.model_fields.get(name)
             if known is None or known.annotation is not float or not low <= high:

@@ -166,6 +166,11 @@ def test_ranges_beyond_what_physics_accepts_are_refused(name, bounds, got):
         check_config(ValidateConfig, {"ranges": {name: bounds}}, "file")
 
 
+def test_a_range_that_would_be_ignored_is_refused():
+    with pytest.raises(ValueError, match="finger_damping is not drawn, it stays critical"):
+        ValidateConfig(ranges={"finger_damping": (50.0, 100.0)})
+
+
 def test_a_table_without_friction_is_refused_where_parts_slide_on_it():
     with pytest.raises(ValueError, match="friction_table_part must be above 0"):
         ValidateConfig(physics=Physics(friction_table_part=0.0))
