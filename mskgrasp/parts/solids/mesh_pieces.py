@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 import trimesh
+from manifold3d import Manifold, OpType
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.decompose import (
@@ -63,6 +64,8 @@ _TRIED_DIRECTIONS = 2
 _MOST_SPLIT = 2_000
 _FAR = 3.0
 """Layers that miss the bounds of a fine part by more than this factor (thin domes) compete with CoACD."""
+_LEAST_VOLUME_RATIO = 0.8
+"""Least volume of pieces that represent a mesh, by the mesh's, and by theirs before slivers are left out."""
 _COARSE_CONCAVITY = 0.02
 """Concavity that CoACD may leave, as a share of the mesh's length: less takes minutes."""
 
@@ -77,12 +80,12 @@ def mesh_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
         Corners (n, 3) of each piece, millimetres.
 
     Raises:
-        BadPart: It is a sheet too thin for any piece.
+        BadPart: It is a sheet too thin for pieces of its volume, or needs too many.
     """
     if mesh_mm.convex_hull.volume <= CONVEX_RATIO * mesh_mm.volume:
         pieces = convex_pieces(mesh_mm)
-        if not pieces:
-            raise BadPart("it is too thin for its length to be cut into solid pieces: make it thicker")
+        if not _is_whole(pieces, mesh_mm.volume):
+            raise BadPart(_TOO_THIN)
         return pieces
     search = _Search(mesh_mm)
     for tolerances in FINE:
@@ -109,6 +112,8 @@ class _Search:
             joined = self._joined(pieces)
             if joined is None:
                 break  # more pieces across the next direction leave too many, too
+            if not _is_whole(joined, self._mesh.volume):
+                continue
             if best is None or len(joined) < len(best):
                 best = joined
             if len(best) <= MOST_HULLS:
@@ -116,18 +121,31 @@ class _Search:
         return best
 
     def coarse(self) -> list[np.ndarray]:
-        """The closest set of joined layers that is small enough, or CoACD's pieces where it is far."""
+        """The closest set of joined layers that is small enough, or CoACD's pieces where it is far.
+
+        Raises:
+            BadPart: All sets lack much of the mesh's volume, or have too many pieces.
+        """
         found: list[tuple[float, list[np.ndarray]]] = []
+        thin = False
         for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
                 steps = (split_slender(step, _MOST_SPLIT) for step in merge_in_steps(pieces, _COARSE_SLACKS))
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
-                if few is not None:
+                if few is not None and _is_whole(few, self._mesh.volume):
                     found.append((_excess(self._surface.fit(few)), few))
+                thin |= few is not None
         if min((excess for excess, _ in found), default=np.inf) > _FAR:
             cut = cut_up(self._mesh, _COARSE_CONCAVITY * float(np.max(self._mesh.extents)))
-            pieces = split_slender(next(with_few_corners(cut, np.inf)), _MOST_SPLIT)
-            found.append((_excess(self._surface.fit(pieces)), pieces))
+            whole = next(with_few_corners(cut, np.inf))
+            pieces = split_slender(whole, _MOST_SPLIT)
+            few = len(pieces) <= MOST_MESH_HULLS
+            # Of two thin walls one may be left out while the other becomes twice as thick.
+            if few and _is_whole(pieces, max(self._mesh.volume, _volume(whole))):
+                found.append((_excess(self._surface.fit(pieces)), pieces))
+            thin |= few
+        if not found:
+            raise BadPart(_TOO_THIN if thin else _TOO_MANY)
         return min(found, key=lambda item: item[0])[1]
 
     def _sets(self, tolerances: Tolerances) -> Iterator[list[np.ndarray]]:
@@ -155,7 +173,24 @@ class _Search:
         return joined if len(joined) <= MOST_MESH_HULLS else None
 
     def _within(self, bounds: tuple[float, float], pieces: Sequence[np.ndarray]) -> bool:
-        return self._surface.fit_within(pieces, *bounds) is not None
+        return bool(pieces) and self._surface.fit_within(pieces, *bounds) is not None
+
+
+_TOO_THIN = "it is too thin for its length to be cut into solid pieces: make it thicker"
+_TOO_MANY = (
+    f"it needs more than {MOST_MESH_HULLS} convex pieces: simplify fine detail such as threads, grilles and "
+    "thin walls"
+)
+
+
+def _is_whole(pieces: Sequence[np.ndarray], volume: float) -> bool:
+    """Whether pieces, millimetres, have most of a volume, mm^3."""
+    return _volume(pieces) >= _LEAST_VOLUME_RATIO * volume
+
+
+def _volume(pieces: Sequence[np.ndarray]) -> float:
+    bodies = [Manifold.hull_points(np.asarray(points, dtype=np.float64)) for points in pieces]
+    return float(Manifold.batch_boolean(bodies, OpType.Add).volume())
 
 
 def _excess(fit: HullFit) -> float:

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
+from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
 from mskgrasp.parts.importing.import_file import import_part
 from mskgrasp.parts.solids import mesh_pieces as mesh_pieces_module
@@ -84,6 +85,36 @@ def test_what_no_fine_layers_represent_becomes_as_close_as_coarse_ones_are(tmp_p
     # Mass is the mesh's, whatever the hulls are.
     assert part.mass == pytest.approx(1e-6 * 6 * (40 * 30 - holes), rel=1e-3)
     assert part.hull_volume_ratio == pytest.approx(40 * 30 / (40 * 30 - holes), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.creation.annulus(20, 40, 0.2, sections=64),
+        trimesh.creation.annulus(15, 25, 0.2, sections=64),
+        trimesh.creation.annulus(20, 40, 0.1, sections=64),
+        mesh_of(s.extrude(np.array([(0, 0), (100, 0), (100, 60), (50, 60), (50, 20), (0, 20)]), 0, 0.15)),
+        mesh_of(s.extrude(np.array([(0, 0), (100, 0), (100, 0.1), (0.1, 0.1), (0.1, 60), (0, 60)]), 0, 20)),
+        trimesh.creation.box((100, 60, 0.01)),
+    ],
+    ids=["shim", "narrow shim", "foil ring", "sheet", "angle of foil", "foil"],
+)
+def test_what_is_too_thin_for_pieces_of_its_volume_is_refused(mesh):
+    with pytest.raises(BadPart, match="too thin for its length .*: make it thicker"):
+        mesh_pieces(mesh)
+
+
+def test_a_shim_as_thick_as_slivers_are_not_has_the_pieces_of_its_volume():
+    mesh = trimesh.creation.annulus(20, 40, 0.3, sections=64)
+    pieces = mesh_pieces(mesh)
+    check(mesh, pieces)
+    assert hull_fit(mesh, pieces).volume_ratio == pytest.approx(1, abs=0.05)
+
+
+def test_a_mesh_that_needs_too_many_pieces_is_refused(monkeypatch):
+    monkeypatch.setattr(mesh_pieces_module, "MOST_MESH_HULLS", 1)
+    with pytest.raises(BadPart, match="needs more than 128 convex pieces: simplify"):
+        mesh_pieces(mesh_of(s.extrude(np.array([(0, 0), (60, 0), (60, 5), (5, 5), (5, 40), (0, 40)]), 0, 20)))
 
 
 @pytest.mark.slow

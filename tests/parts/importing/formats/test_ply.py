@@ -68,7 +68,9 @@ def written(vertices, faces, order: str, number="double", index="uint", name="ve
     """A PLY in this byte order, or as text, with properties that are to be skipped."""
     formats = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}
     codes = {"double": "d", "float": "f", "short": "h", "uint": "I", "int": "i", "uchar": "B", "int64": "q"}
-    rows = [("dBdd".replace("d", codes[number]), (z, 7, x, y)) for x, y, z in vertices]
+    rows: list[tuple[str, tuple[float, ...]]] = [
+        ("dBdd".replace("d", codes[number]), (z, 7, x, y)) for x, y, z in vertices
+    ]
     rows += [("H3hb", (3, 1, 2, 3, -4)), ("H1hb", (1, 5, -6))]
     for corners in faces:
         code = f"B{2 * len(corners)}fi{len(corners)}{codes[index]}d"
