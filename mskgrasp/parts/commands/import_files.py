@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from mskgrasp.parts.importing.import_file import Imported
 
 _NUMBERED = re.compile(r"(-\d+)+$")
-_LOST = "ended the process that imported it, twice: free memory and import it alone, or simplify the mesh"
+_LOST = (
+    "ended the process that imported it, twice: memory was short, or CoACD crashed on its mesh: export it "
+    "coarser, or repair it where walls touch or coincide"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +83,8 @@ def import_files(files: Sequence[Path], options: ImportOptions, workers: int) ->
         name=lambda group: str(group.files[0]),
         rest=_rest,
     )
-    for result in results(work, _groups(files, options), max(1, workers)):
+    # Apart also where there is only one: on some meshes CoACD ends the process.
+    for result in results(work, _groups(files, options), max(1, workers), apart=True):
         del missing[result.path]
         yield result
     for path in missing:
@@ -148,6 +152,12 @@ def _import_one(path: Path, options: ImportOptions, taken: dict[str, Path]) -> F
         )
     except MskgraspError as error:
         return FileResult(path=path, imported=None, reason=str(error))
+    except OSError:
+        raise  # the disk's fault, not the file's, as `read_content` has read that
+    except Exception as error:  # libraries raise exceptions of many types; the other files are imported
+        what = " ".join([f"{type(error).__name__}:", *str(error).splitlines()[:1]])
+        reason = f"{path} could not be imported ({what[:200]}): a defect of mskgrasp, report it with the file"
+        return FileResult(path=path, imported=None, reason=reason)
     taken |= {part.name: path for part in imported.parts}
     return FileResult(path=path, imported=imported, replaced=bool(replaced))
 

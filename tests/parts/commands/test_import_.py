@@ -105,9 +105,7 @@ def importing(tmp_path, monkeypatch, capsys) -> Callable[..., Run]:
     monkeypatch.chdir(tmp_path)
 
     def run(*files: str, **options: Any) -> Run:
-        options = (
-            dict(workers=1) | options
-        )  # more would be processes of their own, which take seconds to start
+        options = dict(workers=1) | options  # every process takes seconds to start
         code = run_import(Import(files=tuple(Path(file) for file in files), **options))
         captured = capsys.readouterr()
         return Run(code, captured.out, captured.err)

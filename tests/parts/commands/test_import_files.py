@@ -1,5 +1,6 @@
 """Parallel import: the same parts for any number of processes, and one bad file among good ones."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +68,31 @@ def test_a_heat_sink_is_a_plate_with_fins_to_its_hulls(tmp_path):
     assert part.grade == "fine" and 1e3 * part.hull_error < 0.2
     assert abs(part.hull_volume_ratio - 1) < 0.01
     assert part.n_hulls <= 28  # a plate cut to PhysX' slenderness, and 13 fins
+
+
+@pytest.mark.slow  # three processes
+def test_a_mesh_that_crashes_a_library_is_refused_in_a_line_and_others_are_imported(tmp_path, capfd):
+    # As wide as the box: its walls touch, which CoACD does not survive.
+    cavity = trimesh.creation.box((40, 30, 10))
+    cavity.invert()
+    (trimesh.creation.box((40, 30, 20)) + cavity).export(tmp_path / "a.stl")
+    trimesh.creation.box((40, 30, 20)).export(tmp_path / "b.stl")
+    found = imported([tmp_path / "a.stl", tmp_path / "b.stl"], tmp_path / "parts", 1)
+    assert found["b.stl"].imported is not None
+    reason = found["a.stl"].reason
+    assert "a.stl ended the process that imported it, twice: memory was short, or CoACD crashed" in reason
+    assert "\n" not in reason
+    assert capfd.readouterr().err.count("a process was lost (exit code -11)") == 1
+
+
+def test_an_error_that_is_not_foreseen_is_the_refusal_of_the_file(tmp_path):
+    paths = [tmp_path / "a.stl", tmp_path / "b.stl"]
+    for path in paths:
+        trimesh.creation.box((40, 30, 20)).export(path)
+    heavy = replace(OPTIONS, density="heavy")  # pyright: ignore[reportArgumentType]
+    results = list(import_files(paths, heavy, 1))
+    assert [result.path for result in results] == paths
+    for result in results:
+        assert result.imported is None and "\n" not in result.reason
+        assert result.reason.startswith(f"{result.path} could not be imported (TypeError: '<=' not supported")
+        assert result.reason.endswith("a defect of mskgrasp, report it with the file")
