@@ -88,7 +88,9 @@ def is_built(name: str) -> bool:
 
 def is_known(name: str) -> bool:
     """Whether a name is that of a built-in part or of one in the parts folder."""
-    return name in _recipes() or bool(LEGAL_NAME.fullmatch(name) and (store.parts_folder() / name).is_dir())
+    return name in _recipes() or bool(
+        LEGAL_NAME.fullmatch(name) and store.is_stored(store.parts_folder() / name)
+    )
 
 
 def find_part(name_or_folder: str | Path) -> Part:

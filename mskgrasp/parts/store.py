@@ -10,11 +10,11 @@ import re
 import shutil
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,12 @@ _UNPHYSICAL = ("content_hash", "recipe_hash", "source", "licence", ORIGIN)
 
 _ABANDONED_S = 3600.0
 """Temporary folders older than this were left behind by a killed process."""
+
+_TRIES = 10
+_PAUSE_S = 0.02
+"""Reading is tried again, after a pause, where another process replaces the folder: it takes milliseconds."""
+
+_Read = TypeVar("_Read")
 
 _FOLDER_OVERRIDE: ContextVar[Path | None] = ContextVar("folder_override", default=None)
 
@@ -84,7 +90,7 @@ def write_part(name: str, mesh: bytes, hulls: bytes, record: dict[str, Any]) -> 
 
 def pack_part(part: Part) -> dict[str, bytes]:
     """The files of a part by name, for sending to another machine."""
-    return {name: _read(part.folder, name) for name in FILES}
+    return _read_steadily(part.folder, lambda: {name: _read(part.folder, name) for name in FILES})
 
 
 def receive_part(name: str, digest: str, contents: Mapping[str, bytes]) -> Part:
@@ -139,7 +145,68 @@ def read_part(folder: Path | str) -> Part:
     Raises:
         BadPart: A file is missing, damaged, of another schema version, or a link out of the folder.
     """
-    folder = Path(folder)
+    return read_part_and_record(Path(folder))[0]
+
+
+def read_part_and_record(folder: Path) -> tuple[Part, dict[str, Any]]:
+    """A part and all of its ``part.json``, of one state of the folder.
+
+    Raises:
+        BadPart: As in `read_part`.
+    """
+    return _read_steadily(folder, lambda: _read_all(folder))
+
+
+def stored_recipe_hash(folder: Path) -> str | None:
+    """Hash of the recipe that made a folder's part; None where there is no undamaged part."""
+    try:
+        return str(read_part_and_record(folder)[1].get("recipe_hash"))
+    except BadPart:
+        return None
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """All of ``part.json``, with fields that Part lacks (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
+    return _read_steadily(folder, lambda: _record(folder, _read(folder, "part.json")))
+
+
+def is_stored(folder: Path) -> bool:
+    """Whether there is such a folder, also while another process replaces it."""
+    for _ in range(_TRIES):
+        if folder.is_dir() or not _is_moved_away(folder):
+            break
+        time.sleep(_PAUSE_S)
+    return folder.is_dir()
+
+
+def _read_steadily(folder: Path, read: Callable[[], _Read]) -> _Read:
+    """What ``read`` gives; again where it fails and another process has replaced the folder meanwhile."""
+    left = _TRIES
+    while True:
+        before, left = _state(folder), left - 1
+        try:
+            return read()
+        except (BadPart, FileNotFoundError):
+            if not left or (_state(folder) == before and not _is_moved_away(folder)):
+                raise
+        time.sleep(_PAUSE_S)
+
+
+def _state(folder: Path) -> tuple[int, int] | None:
+    """Changes where the folder is replaced; None where there is none."""
+    try:
+        status = folder.stat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_mtime_ns
+
+
+def _is_moved_away(folder: Path) -> bool:
+    """Whether another process has moved the folder away and not put another in its place yet."""
+    return not folder.exists() and any(folder.parent.glob(f".tmp-{folder.name}-*-old"))
+
+
+def _read_all(folder: Path) -> tuple[Part, dict[str, Any]]:
     contents = {name: _read(folder, name) for name in FILES}
     record = _record(folder, contents["part.json"])
     if record.get("schema_version") != SCHEMA_VERSION:
@@ -154,45 +221,36 @@ def read_part(folder: Path | str) -> Part:
         raise BadPart(f"{folder / 'part.json'} is damaged ({what}): {_REMEDY}") from error
     if content_hash(contents["mesh.ply"], contents["hulls.glb"], record) != part.content_hash:
         raise BadPart(f"{folder}: the files do not match the hash in part.json: {_REMEDY}")
-    return part
-
-
-def stored_recipe_hash(folder: Path) -> str | None:
-    """Hash of the recipe that made a folder's part; None where there is no undamaged part."""
-    try:
-        read_part(folder)
-        return str(_record(folder, _read(folder, "part.json")).get("recipe_hash"))
-    except BadPart:
-        return None
-
-
-def read_record(folder: Path) -> dict[str, Any]:
-    """All of ``part.json``, with fields that Part lacks (``hull_error_p95``, ``hull_volume_ratio``, ...)."""
-    return _record(folder, _read(folder, "part.json"))
+    return part, record
 
 
 _REMEDY = "delete the folder, then build or import the part again"
 
 
 def _replace_folder(temporary: Path, final: Path) -> None:
-    for _ in range(20):
-        try:
-            os.rename(temporary, final)
-            return
-        except OSError as error:
-            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
-                raise
-        if _holds_the_same(final, temporary):
-            return
-        old = temporary.with_name(temporary.name + "-old")
-        try:
-            os.rename(final, old)
-        except FileNotFoundError:
-            continue
-        if old.is_dir():
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            old.unlink()
+    moved_away: list[Path] = []
+    try:
+        for attempt in range(20):
+            try:
+                os.rename(temporary, final)
+                return
+            except OSError as error:
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
+                    raise
+            if _holds_the_same(final, temporary):
+                return
+            old = temporary.with_name(f"{temporary.name}-{attempt}-old")
+            try:
+                os.rename(final, old)
+            except FileNotFoundError:
+                continue
+            moved_away.append(old)
+    finally:  # not before: until the new one is in its place, readers find none
+        for old in moved_away:
+            if old.is_dir():
+                shutil.rmtree(old, ignore_errors=True)
+            else:
+                old.unlink()
     raise BadPart(f"{final} keeps being replaced by another process: run one build at a time")
 
 

@@ -5,14 +5,17 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
+import trimesh
 
 import mskgrasp.parts
 from mskgrasp.core.errors import BadPart, UnknownPart
-from mskgrasp.parts import build_part, find_part, parts_folder, read_part
+from mskgrasp.parts import build_part, find_part, parts_folder, read_part, store
+from mskgrasp.parts.importing.import_file import import_part, part_of_file
 
 FILES = ("mesh.ply", "hulls.glb", "part.json")
 
@@ -168,6 +171,64 @@ def test_two_processes_may_build_the_same_part_at_once(own_cache, builtin_parts)
         hashes = pool.map(_hash_of, ["hex_nut_m20"] * 4, chunksize=1)
     assert set(hashes) == {builtin_parts["hex_nut_m20"].content_hash}
     assert [path.name for path in own_cache.iterdir()] == ["hex_nut_m20"]
+
+
+def test_a_part_is_found_while_another_process_replaces_it(tmp_path, monkeypatch):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((1, 0.5, 0.4)).export(file)
+    part = import_part(file, unit="in", density=2700.0)
+    moved, rename = threading.Event(), os.rename
+
+    def slow(source: Path, target: Path) -> None:
+        rename(source, target)
+        if source == part.folder:
+            moved.set()
+            time.sleep(0.05)
+
+    monkeypatch.setattr(store.os, "rename", slow)
+    for find in (find_part, part_of_file):
+        moved.clear()
+        replacing = threading.Thread(target=import_part, args=[file], kwargs=dict(unit="in", density=1050.0))
+        replacing.start()
+        assert moved.wait(10)
+        found = find(part.name if find is find_part else file)
+        replacing.join()
+        assert (found.density, found.extents) == (1050.0, pytest.approx(part.extents))
+        import_part(file, unit="in", density=2700.0)
+
+
+def test_a_part_is_read_whole_while_its_folder_is_replaced_again_and_again(tmp_path):
+    part = build_part("washer_m36")
+    first = contents(part.folder)
+    record = json.loads(first["part.json"]) | {"density": 1.0, "mass": 2.0}
+    record["content_hash"] = store.content_hash(first["mesh.ply"], first["hulls.glb"], record)
+    second = first | {"part.json": json.dumps(record).encode()}
+    stop = threading.Event()
+
+    def replace() -> None:
+        while not stop.is_set():
+            for files in (second, first):
+                store._put(part.folder.parent, part.name, files)
+
+    replacing = threading.Thread(target=replace)
+    replacing.start()
+    try:
+        found = {(one.density, one.mass) for one in (read_part(part.folder) for _ in range(200))}
+    finally:
+        stop.set()
+        replacing.join()
+    assert found <= {(part.density, part.mass), (1.0, 2.0)}
+
+
+def test_a_damaged_part_is_reported_without_waiting(monkeypatch):
+    folder = build_part("washer_m36").folder
+    (folder / "mesh.ply").write_bytes(b"ply")
+    monkeypatch.setattr(store.time, "sleep", lambda seconds: pytest.fail("waits"))
+    with pytest.raises(BadPart, match="do not match the hash"):
+        read_part(folder)
+    (folder / "mesh.ply").unlink()
+    with pytest.raises(BadPart, match="mesh.ply is missing"):
+        read_part(folder)
 
 
 def test_arrays_of_a_part_cannot_be_changed():

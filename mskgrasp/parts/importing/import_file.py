@@ -23,7 +23,7 @@ from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
 from mskgrasp.parts.catalogue import SETS
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, read_content, read_mesh
-from mskgrasp.parts.importing.origin import Origin, read_origin
+from mskgrasp.parts.importing.origin import Origin, origin_of
 from mskgrasp.parts.part import Part
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
@@ -148,14 +148,14 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
             imported again, with the other options of that import.
 
     Raises:
-        BadPart: As in `import_file`; or the part of this name was made of another file.
+        BadPart: As in `import_file`; or the part of this name is damaged or was made of another file.
     """
     name = legal_name(f"example_{path.stem}" if is_example(path) else path.stem)
     folder = store.parts_folder() / name
-    stored = store.stored_recipe_hash(folder)
-    if stored is None or name in builtin_names():
+    if name in builtin_names() or not store.is_stored(folder):
         return import_part(path, name=name, unit=unit)
-    known, origin, sha256 = store.read_part(folder), read_origin(folder), _sha256(read_content(path))
+    known, record = store.read_part_and_record(folder)
+    origin, sha256 = origin_of(record), _sha256(read_content(path))
     command = f"python -m mskgrasp.parts import {shlex.quote(str(path))}"
     if origin is None:
         raise BadPart(
@@ -169,7 +169,8 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
             "in place of that part, or with --name"
         )
     options = known.family, origin.unit, known.density, known.licence, origin.bodies
-    current = _recipe_hash(origin.path, bytes.fromhex(origin.sha256), *options) == stored
+    digest = _recipe_hash(origin.path, bytes.fromhex(origin.sha256), *options)
+    current = digest == record.get("recipe_hash")
     if current and not changed and unit in (None, origin.unit):
         return known
     unit = unit or origin.unit
@@ -239,9 +240,11 @@ def _check_available(name: str, check_name: Callable[[str], None]) -> None:
 
 def _known(name: str, recipe_hash: str) -> Part | None:
     folder = store.parts_folder() / name
-    if store.stored_recipe_hash(folder) != recipe_hash or read_origin(folder) is None:
+    try:
+        part, record = store.read_part_and_record(folder)
+    except BadPart:
         return None
-    return store.read_part(folder)
+    return part if record.get("recipe_hash") == recipe_hash and origin_of(record) is not None else None
 
 
 def _make(

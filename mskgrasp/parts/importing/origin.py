@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -25,13 +26,9 @@ class Origin(Config):
     """What was done with several bodies."""
 
 
-def read_origin(folder: Path) -> Origin | None:
-    """Read the origin of a stored part; None where it has none, or a damaged one.
-
-    Raises:
-        BadPart: There is no part, or its ``part.json`` is damaged.
-    """
+def origin_of(record: dict[str, Any]) -> Origin | None:
+    """The origin in a ``part.json``; None where it has none, or a damaged one."""
     try:
-        return Origin.model_validate(store.read_record(folder).get(store.ORIGIN))
+        return Origin.model_validate(record.get(store.ORIGIN))
     except ValidationError:
         return None

@@ -218,6 +218,30 @@ def test_a_unit_that_the_import_did_not_name_leaves_the_density_as_it_is(tmp_pat
     assert part_of_file(file).mass == pytest.approx(light.mass)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("mass", -1.0, "is damaged .*: delete the folder, then build or import the part again"),
+        (
+            "schema_version",
+            99,
+            "has schema version 99, this program reads .*: build or import the part again",
+        ),
+    ],
+)
+def test_a_program_does_not_replace_a_part_that_it_cannot_read(tmp_path, key, value, said):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box((1, 0.5, 0.4)).export(file)
+    part = import_part(file, unit="in", density=1050.0)
+    record = part.folder / "part.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {key: value}))
+    before = record.read_bytes()
+    with pytest.raises(BadPart, match=said):
+        part_of_file(file)
+    assert record.read_bytes() == before
+    assert import_part(file, unit="in", density=1050.0).content_hash == part.content_hash
+
+
 def write_open(file: Path) -> None:
     box = trimesh.creation.box((40, 30, 20))
     trimesh.Trimesh(box.vertices, box.faces[:-1], process=False).export(file)
