@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from manifold3d import CrossSection, Manifold, OpType
 
-from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
-from mskgrasp.parts.solids.surface import Surface
-from tests.parts.importing.surfaces import box, extruded, refusal, torus
+from mskgrasp.parts.importing.winding import LINES, _crossings, miscounted_fraction, winding_number
+from mskgrasp.parts.solids.surface import Surface, joined_surfaces, manifold_of, surface_of
+from tests.parts.importing.surfaces import box, extruded, one, refusal, torus
 
 
 def pentagram() -> Surface:
@@ -28,3 +29,29 @@ def test_volume_counted_twice_is_measured_as_the_formula_says_and_refused():
 def test_a_surface_that_does_not_cross_itself_has_nothing_counted_twice(surface):
     assert miscounted_fraction(surface.triangles) == 0
     assert winding_number(surface.triangles, surface.vertices.max(axis=0) + 1) == pytest.approx(0, abs=1e-9)
+
+
+def angle(thickness: float) -> Surface:
+    """An angle of 150 x 150 x 20 mm."""
+    a, t = 150.0, thickness
+    outline = np.array([(0, 0), (a, 0), (a, t), (t, t), (t, a), (0, a)])
+    body = Manifold.extrude(CrossSection([outline]), 20.0)
+    return surface_of(body)
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize("thickness", [0.3, 0.7])
+def test_a_sound_wall_between_all_lines_of_an_axis_has_nothing_counted_twice(turns, thickness):
+    surface = surface_of(manifold_of(angle(thickness)).rotate((0, 0, 90 * turns)))
+    assert miscounted_fraction(surface.triangles) == 0
+    assert one(surface).notes == ()
+
+
+def test_a_thin_frame_between_all_lines_of_all_axes_is_looked_at_with_finer_ones():
+    rods = [Manifold.cube((150, 0.2, 0.2)), Manifold.cube((0.2, 150, 0.2)), Manifold.cube((0.2, 0.2, 150))]
+    frame = Manifold.batch_boolean(rods, OpType.Add)
+    corner = frame.translate((0.05, 0.05, 0.05))
+    assert all(not len(_crossings(surface_of(frame).triangles, axis, LINES)[0]) for axis in range(3))
+    assert miscounted_fraction(surface_of(frame).triangles) == 0
+    twice = joined_surfaces([surface_of(frame), surface_of(corner)])
+    assert miscounted_fraction(twice.triangles) > 0.2
