@@ -120,7 +120,9 @@ def conclusion(
         most = wilson_interval(0, scenes)[1]
         width = least_widths(part).min()
         lead = f"{part.name} was not grasped: none"
-        if width > MAX_OPENING:
+        if width == np.inf:
+            lead = f"{part.name} has no two opposite faces that fingers could hold, in any resting pose. None"
+        elif width > MAX_OPENING:
             lead = (
                 f"{part.name} is wider than the hand in every resting pose: where fingers could hold it, "
                 f"its faces are {1e3 * width:.0f} mm apart or more, and the hand opens "

@@ -9,10 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from mskgrasp.assess.config import parse_tolerance
-from mskgrasp.assess.report import poses_section, write_report
+from mskgrasp.assess.report import conclusion, poses_section, write_report
 from mskgrasp.assess.trials import EXACT, NOISY
+from mskgrasp.parts.importing.import_file import import_part
+from mskgrasp.parts.least_width import least_widths
 from tests.assess.made_trials import failed, made
 from tests.browser import Page
 from tests.planning.test_certified import PART, certified, certified_grasp
@@ -96,6 +99,18 @@ def test_a_part_that_nothing_lifts_gets_a_report_that_says_so_first(tmp_path):
     assert headline.startswith("hex_nut_m20 was not grasped: none of 8 attempts lifted it (")
     assert "refused" in headline and "no grasp lifts it" in headline and "rare" not in headline
     assert "by 2 scenes: 0 to 66%" in headline  # in which both planners plan the same
+
+
+def test_of_a_part_without_opposite_faces_no_width_is_stated(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    trimesh.creation.cone(20.0, 4.0, sections=64).export(tmp_path / "cone.stl")
+    part = import_part(tmp_path / "cone.stl")
+    assert np.isinf(least_widths(part)).all()
+    said = conclusion(part, certified(conditions=CONDITIONS), [failed(0, "refused")], {})
+    assert said.startswith(
+        "cone has no two opposite faces that fingers could hold, in any resting pose. None of 1 attempts "
+        "lifted it (refused 1"
+    )
 
 
 def test_a_part_that_is_too_heavy_was_not_tried(tmp_path):
