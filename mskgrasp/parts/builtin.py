@@ -6,7 +6,6 @@ import difflib
 import hashlib
 import json
 import re
-import shlex
 from functools import lru_cache
 from pathlib import Path
 
@@ -127,12 +126,20 @@ def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
 
     if Path(name).suffix.lower() in LOADERS:
         if Path(name).is_file():
-            stem, command = Path(name).stem, f"python -m mskgrasp.parts import {shlex.quote(name)}"
-            if stem in imported_names():
+            from mskgrasp.parts.importing.import_file import import_command, legal_name  # needs this module
+
+            try:
+                part = legal_name(Path(name).stem)
+            except BadPart:
+                part = ""  # of such a file none is made without --name
+            if part in imported_names():
+                command = import_command(Path(name), store.parts_folder() / part)
                 return UnknownPart(
-                    f"{name} is a CAD file: name the part {stem}, or import the file, {command}"
+                    f"{name} is a CAD file: name the part {part}, or import the file, {command}"
                 )
-            return UnknownPart(f"{name} is a CAD file: import it, {command}, and name the part")
+            return UnknownPart(
+                f"{name} is a CAD file: import it, {import_command(Path(name))}, and name the part"
+            )
         known = f", or name the part {Path(name).stem}" if Path(name).stem in _recipes() else ""
         return UnknownPart(f"there is no file {name}; check the path{known}")
     if not cad.available() and any(recipe.name == name for recipe in cad.recipes()):

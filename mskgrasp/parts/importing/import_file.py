@@ -35,6 +35,9 @@ from mskgrasp.runtime.progress import note
 
 STEEL = 7850.0
 """Density of parts unless stated, kg/m^3."""
+FAMILY = "imported"
+NO_LICENCE = "NOASSERTION"
+"""Licence of parts unless stated, as SPDX writes it."""
 USUAL_DENSITY = (10.0, 25_000.0)
 """From foam to osmium, kg/m^3."""
 
@@ -66,10 +69,10 @@ def import_file(
     path: Path,
     *,
     name: str | None = None,
-    family: str = "imported",
+    family: str = FAMILY,
     unit: Unit | None = None,
     density: float = STEEL,
-    licence: str = "NOASSERTION",
+    licence: str = NO_LICENCE,
     bodies: Bodies = "one",
     check_name: Callable[[str], None] = lambda name: None,
 ) -> Imported:
@@ -156,17 +159,16 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
         return import_part(path, name=name, unit=unit)
     known, record = store.read_part_and_record(folder)
     origin, sha256 = origin_of(record), _sha256(read_content(path))
-    command = f"python -m mskgrasp.parts import {shlex.quote(str(path))}"
     if origin is None:
         raise BadPart(
             f"the part {name!r} does not say of which file it was made, as those of today do: import it "
-            f"again, {command}, with its density and unit"
+            f"again, {import_command(path, folder)}, with its --unit if that is not mm"
         )
     changed = sha256.hex() != origin.sha256
     if changed and path.resolve() != origin.path:
         raise BadPart(
-            f"the part {name!r} was made of {origin.path}, and {path} is another file: import it, {command}, "
-            "in place of that part, or with --name"
+            f"the part {name!r} was made of {origin.path}, and {path} is another file: import it, "
+            f"{import_command(path, folder)}, in place of that part, or with --name"
         )
     options = known.family, origin.unit, known.density, known.licence, origin.bodies
     digest = _recipe_hash(origin.path, bytes.fromhex(origin.sha256), *options)
@@ -187,6 +189,20 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
         names = ", ".join(part.name for part in imported.parts)
         raise BadPart(f"{path} holds {len(imported.parts)} bodies now, which are the parts {names}: name one")
     return imported.parts[0]
+
+
+def import_command(path: Path, folder: Path | None = None) -> str:
+    """The command that imports a file, with the options of a folder's part that are not the defaults."""
+    words = ["python -m mskgrasp.parts import", shlex.quote(str(path))]
+    if folder is not None and store.stored_recipe_hash(folder) is not None:
+        part, record = store.read_part_and_record(folder)
+        origin = origin_of(record)
+        words += [f"--density {part.density:g}"] if part.density != STEEL else []
+        words += [f"--unit {origin.unit}"] if origin and origin.unit else []
+        words += [f"--{origin.bodies}"] if origin and origin.bodies != "one" else []
+        words += [f"--family {shlex.quote(part.family)}"] if part.family != FAMILY else []
+        words += [f"--licence {shlex.quote(part.licence)}"] if part.licence != NO_LICENCE else []
+    return " ".join(words)
 
 
 def _sha256(content: bytes) -> bytes:

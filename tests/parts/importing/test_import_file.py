@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from build123d import Box, Cylinder, export_step
 
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.shipped import example_file
 from mskgrasp.parts import find_part
 from mskgrasp.parts.importing import import_file as importing
@@ -183,6 +183,37 @@ def test_a_program_does_not_replace_the_part_of_another_file(tmp_path):
     same.write_bytes(mine.read_bytes())
     assert part_of_file(same).content_hash == part.content_hash
     assert import_part(other).extents[0] == pytest.approx(0.05)  # asked for by its name
+
+
+def test_the_commands_in_refusals_keep_the_options_of_the_import(tmp_path, monkeypatch):
+    file = tmp_path / "Clamp Part.stl"
+    trimesh.creation.box((1, 0.5, 0.4)).export(file)
+    options = dict(unit="in", density=1050.0, licence="MIT", family="my clamps", bodies="union")
+    part = import_part(file, **options)
+    with_options = "Part.stl' --density 1050 --unit in --union --family 'my clamps' --licence MIT"
+    with pytest.raises(UnknownPart, match=f"name the part clamp-part, or import the file, .*{with_options}$"):
+        find_part(str(file))
+    other = tmp_path / "other" / file.name
+    other.parent.mkdir()
+    trimesh.creation.box((2, 0.5, 0.4)).export(other)
+    with pytest.raises(BadPart, match=f"is another file: import it, .*{with_options}, in place of that part"):
+        part_of_file(other)
+    record = part.folder / "part.json"
+    values = json.loads(record.read_text())
+    del values["imported_from"]
+    record.write_text(json.dumps(values))
+    with pytest.raises(
+        BadPart, match="Part.stl' --density 1050 --family 'my clamps' --licence MIT, with its --unit"
+    ):
+        part_of_file(file)
+    # Of a built-in part of the name no option is taken.
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((40, 30, 20)).export("hex_nut_m20.stl")
+    find_part("hex_nut_m20")
+    with pytest.raises(
+        UnknownPart, match="import it, python -m mskgrasp.parts import hex_nut_m20.stl, and name"
+    ):
+        find_part("hex_nut_m20.stl")
 
 
 def test_a_shipped_example_does_not_replace_a_part_of_its_name(tmp_path):
