@@ -7,7 +7,7 @@ import json
 import re
 import shlex
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -129,9 +129,10 @@ def import_file(
             unchanged = False
             known = _make(mesh, path, each, family, density, licence, recipe_hash, origin)
         parts.append(known)
-    return Imported(
-        parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=(*file.notes, *repaired.notes)
-    )
+    notes = (*file.notes, *repaired.notes)
+    if bodies == "split" and (left := _left_of_split(name, names, path)):
+        notes += (f"kept {', '.join(left)} of an earlier import of it: delete the folders if not wanted",)
+    return Imported(parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=notes)
 
 
 def import_part(path: Path, **options: object) -> Part:
@@ -261,6 +262,23 @@ def _known(name: str, recipe_hash: str) -> Part | None:
     except BadPart:
         return None
     return part if record.get("recipe_hash") == recipe_hash and origin_of(record) is not None else None
+
+
+def _left_of_split(name: str, names: Sequence[str], path: Path) -> list[str]:
+    """Parts that an earlier split import of the same file made, and this one did not."""
+    # Names of 80 characters are cut off before their number.
+    pattern = re.compile(re.escape(name[:70]) + (".*" if len(name) > 70 else "") + r"(-\d+)?")
+    left = []
+    for folder in store.parts_folder().glob(f"{name[:70]}*"):
+        if folder.name in names or not pattern.fullmatch(folder.name):
+            continue
+        try:
+            origin = origin_of(store.read_record(folder))
+        except BadPart:
+            continue
+        if origin is not None and (origin.path, origin.bodies) == (path.resolve(), "split"):
+            left.append(folder.name)
+    return sorted(left)
 
 
 def _make(
