@@ -7,7 +7,7 @@ from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.console import Console
@@ -22,6 +22,9 @@ from mskgrasp.parts.part import Part
 from mskgrasp.runtime.console_table import Table, print_table, report_console
 from mskgrasp.runtime.progress import note, progress
 from mskgrasp.runtime.worker_pool import process_count
+
+if TYPE_CHECKING:
+    from mskgrasp.parts.importing.import_file import Imported
 
 _FLAG = tyro.conf.FlagCreatePairsOff
 
@@ -136,7 +139,7 @@ def _import_all(command: Import, files: Sequence[Path]) -> Generator[FileResult]
                 note(f"error: {result.reason}")
             else:
                 for part in result.imported.parts:
-                    for warning in _warnings(part, result.imported.unit):
+                    for warning in _warnings(part, result.imported):
                         note(f"warning: {warning}")
             yield result
             bar.update()
@@ -164,14 +167,16 @@ def _without(message: str, path: Path) -> str:
     return message.removeprefix(str(path)).removeprefix(":").strip()
 
 
-def _warnings(part: Part, unit: str) -> list[str]:
+def _warnings(part: Part, imported: Imported) -> list[str]:
     from mskgrasp.core.units import MILLIMETRES
     from mskgrasp.parts.importing.mesh_files import USUAL_SIZE_MM, size_hint
 
     found = []
     longest = 1e3 * part.longest_axis
     if not USUAL_SIZE_MM[0] <= longest <= USUAL_SIZE_MM[1]:
-        hint = f" ({size_hint(longest, unit, MILLIMETRES[unit])})" if unit in MILLIMETRES else ""
+        unit = imported.unit
+        may_choose = unit in MILLIMETRES and not imported.states_unit
+        hint = f" ({size_hint(longest, unit, MILLIMETRES[unit])})" if may_choose else ""
         found.append(
             f"{part.name} is {longest:.4g} mm long; the usual size is "
             f"{USUAL_SIZE_MM[0]:.0f} to {USUAL_SIZE_MM[1]:.0f} mm: is the unit right?{hint}"

@@ -57,12 +57,14 @@ class Imported:
         unchanged: The parts folder had them already, from the same file with the same options.
         unit: Unit of the file's coordinates; empty where the file was not read.
         notes: Repairs and remarks, one sentence each.
+        states_unit: The file states its unit, so that no other may be chosen.
     """
 
     parts: tuple[Part, ...]
     unchanged: bool
     unit: str
     notes: tuple[str, ...]
+    states_unit: bool = False
 
 
 def import_file(
@@ -132,7 +134,9 @@ def import_file(
     notes = (*file.notes, *repaired.notes)
     if bodies == "split" and (left := _left_of_split(name, names, path)):
         notes += (f"kept {', '.join(left)} of an earlier import of it: delete the folders if not wanted",)
-    return Imported(parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=notes)
+    return Imported(
+        parts=tuple(parts), unchanged=unchanged, unit=file.unit, notes=notes, states_unit=file.states_unit
+    )
 
 
 def import_part(path: Path, **options: object) -> Part:

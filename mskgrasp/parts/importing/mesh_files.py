@@ -45,11 +45,13 @@ class MeshFile:
     Attributes:
         objects: As separated in the file, millimetres; an STL, OBJ or PLY is one object.
         unit: Unit of the file's coordinates, stated or assumed.
+        states_unit: The file states it, so that no other may be chosen.
         notes: Remarks for the user.
     """
 
     objects: tuple[Surface, ...]
     unit: str
+    states_unit: bool
     notes: tuple[str, ...]
 
 
@@ -109,13 +111,14 @@ def read_mesh(path: Path, content: bytes, unit: Unit | None) -> MeshFile:
         _check_arrays(path, item)
     name, scale = _unit(path, loaded, unit)
     objects = [Surface(vertices=item.vertices * scale, faces=item.faces) for item in objects]
-    _check_size(path, objects, name, scale, may_choose=loaded.unit is None or loaded.unit_by_convention)
+    states_unit = loaded.unit is not None and not loaded.unit_by_convention
+    _check_size(path, objects, name, scale, may_choose=not states_unit)
     notes = list(loaded.notes)
     if loaded.unit_by_convention and unit is not None and scale != loaded.unit_mm:
         notes.append(
             f"read in {unit} as --unit says; {suffix[1:].upper()} is in {loaded.unit} by its standard"
         )
-    return MeshFile(objects=tuple(objects), unit=name, notes=tuple(notes))
+    return MeshFile(objects=tuple(objects), unit=name, states_unit=states_unit, notes=tuple(notes))
 
 
 def length_text(millimetres: float) -> str:

@@ -166,12 +166,15 @@ def test_repairs_parts_and_names_are_in_the_table(importing, tmp_path):
 def test_an_unusual_size_or_weight_is_imported_with_a_warning(importing, tmp_path):
     box(tmp_path / "block.stl", 160, 80, 80)
     box(tmp_path / "inch.stl", 3, 2, 1)
-    done = importing("block.stl", "inch.stl")
+    trimesh.Scene(trimesh.creation.box((3, 2, 1))).export(tmp_path / "small.3mf")
+    done = importing("block.stl", "inch.stl", "small.3mf")
     assert done.code == 0
     warnings = done.stderr.splitlines()
     assert warnings[0].startswith("warning: block is 160 mm long; the usual size is 20 to 150 mm")
     assert warnings[1] == "warning: block weighs 8.04 kg, the arm carries 2.27 kg: is --density right?"
     assert "inch is 3 mm long" in warnings[2] and "(--unit in would make it 76.2 mm)" in warnings[2]
+    # A 3MF states its unit, and another is refused.
+    assert warnings[3] == ("warning: small is 3 mm long; the usual size is 20 to 150 mm: is the unit right?")
 
 
 def fine_pin(file: Path, radius: float = 8.0, length: float = 60.0, sides: int = 1000) -> None:
