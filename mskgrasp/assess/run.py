@@ -115,7 +115,7 @@ def _sources(config: AssessConfig) -> list[str]:
             "name a part, a part folder, a CAD file or a folder of them: "
             "python -m mskgrasp.assess bracket.stl"
         )
-    from mskgrasp.parts.importing.import_file import legal_name  # loads CoACD, which takes a while
+    from mskgrasp.parts.importing.import_file import legal_name  # the readers load slowly
 
     unique: dict[Path | str, str] = {}
     for text in sources:

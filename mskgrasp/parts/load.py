@@ -30,7 +30,7 @@ def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
         BadPart: The file or folder cannot be used as a part, or a unit is given for no file.
     """
     if Path(source).is_file():
-        from mskgrasp.parts.importing.import_file import part_of_file  # loads CoACD, which takes a while
+        from mskgrasp.parts.importing.import_file import part_of_file  # the readers load slowly
 
         return part_of_file(Path(source), unit=unit)
     if unit is not None:

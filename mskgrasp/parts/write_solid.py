@@ -13,6 +13,7 @@ from trimesh.exchange.ply import export_ply
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import store
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
+from mskgrasp.parts.solids.decompose import convex_pieces, fewest_hulls
 from mskgrasp.parts.solids.measure import (
     MOST_ASPECT_RATIO,
     MOST_P95_MM,
@@ -36,9 +37,6 @@ def with_hulls(solid: Solid) -> Solid:
     """The solid with hulls: those of its family, joined where they are many, or those of a decomposition."""
     if solid.hulls and len(solid.hulls) <= MANY_HULLS:
         return solid
-    # CoACD is slow to load, and most parts do not need it.
-    from mskgrasp.parts.solids.decompose import convex_pieces, fewest_hulls
-
     mesh = trimesh.Trimesh(np.array(solid.mesh.vertices), solid.mesh.faces, process=False)
     hulls = fewest_hulls(mesh, solid.hulls) if solid.hulls else convex_pieces(mesh)
     return Solid(mesh=solid.mesh, hulls=tuple(hulls))

@@ -77,7 +77,7 @@ def run_import(command: Import) -> int:
     Raises:
         UsageError: There is nothing to import, or the options contradict each other.
     """
-    # CoACD and the readers are loaded only here, so that the other commands start faster.
+    # The readers are loaded only here, so that the other commands start faster.
     from mskgrasp.parts.importing.import_file import check_density
     from mskgrasp.parts.importing.select_files import select_files
 

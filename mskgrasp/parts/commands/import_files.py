@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 _NUMBERED = re.compile(r"(-\d+)+$")
 _LOST = (
-    "ended the process that imported it, twice: memory was short, or CoACD crashed on its mesh: export it "
-    "coarser, or repair it where walls touch or coincide"
+    "ended the process that imported it, twice: memory was short, or a library crashed; free memory, or "
+    "export it coarser"
 )
 
 
@@ -83,7 +83,7 @@ def import_files(files: Sequence[Path], options: ImportOptions, workers: int) ->
         name=lambda group: str(group.files[0]),
         rest=_rest,
     )
-    # Apart also where there is only one: on some meshes CoACD ends the process.
+    # Apart also where there is only one: what ends its process must not end this one.
     for result in results(work, _groups(files, options), max(1, workers), apart=True):
         del missing[result.path]
         yield result
@@ -135,7 +135,7 @@ def _import_group(options: ImportOptions, group: _Group) -> Iterator[FileResult]
 
 
 def _import_one(path: Path, options: ImportOptions, taken: dict[str, Path]) -> FileResult:
-    # CoACD and the readers take a while to load, which the process that only waits need not do.
+    # The readers take a while to load, which the process that only waits need not do.
     from mskgrasp.parts.importing.import_file import import_file
 
     replaced: list[str] = []

@@ -6,9 +6,11 @@ search, SIGGRAPH 2022.
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 
-import coacd
 import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
@@ -47,6 +49,19 @@ _SLIVER_MM = 0.2
 CONVEX_RATIO = 1.001
 _OVERLAP_MM = 0.1
 _LOST_SHARE = 0.4
+
+
+_PROGRAM = """
+import os, pickle, sys
+out = os.dup(1)
+os.dup2(2, 1)  # CoACD prints to standard output
+import coacd
+coacd.set_log_level("error")
+vertices, faces, settings = pickle.load(sys.stdin.buffer)
+pieces = coacd.run_coacd(coacd.Mesh(vertices, faces), **settings)
+with os.fdopen(out, "wb") as file:
+    pickle.dump([points for points, _ in pieces], file)
+"""
 
 
 def convex_pieces(mesh_mm: trimesh.Trimesh) -> tuple[np.ndarray, ...]:
@@ -104,10 +119,12 @@ def fewest_hulls(
 
 
 def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
-    """Pieces (n, 3) of CoACD, at most ``MOST_HULLS``, of this concavity where these suffice."""
-    coacd.set_log_level("error")
-    pieces = coacd.run_coacd(
-        coacd.Mesh(np.asarray(mesh_mm.vertices), np.asarray(mesh_mm.faces)),
+    """Pieces (n, 3) of CoACD, at most ``MOST_HULLS``, of this concavity where these suffice.
+
+    Raises:
+        BadPart: CoACD crashed.
+    """
+    settings = dict(
         threshold=concavity_mm,
         real_metric=True,
         max_convex_hull=MOST_HULLS,
@@ -120,7 +137,19 @@ def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
         mcts_max_depth=3,
         seed=0,
     )
-    return [np.asarray(vertices, dtype=float) for vertices, _ in pieces]
+    # In a separate process: on walls that touch CoACD may crash, and would end this one.
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", _PROGRAM],
+        input=pickle.dumps((np.asarray(mesh_mm.vertices), np.asarray(mesh_mm.faces), settings)),
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode:
+        raise BadPart(
+            f"CoACD, which cuts it into convex pieces, crashed (exit code {done.returncode}): repair its "
+            "mesh where walls touch or coincide, or export it coarser"
+        )
+    return [np.asarray(points, dtype=float) for points in pickle.loads(done.stdout)]
 
 
 def with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:

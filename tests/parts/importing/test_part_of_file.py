@@ -195,3 +195,13 @@ def test_a_program_does_not_replace_a_part_that_it_cannot_read(tmp_path, key, va
         part_of_file(file)
     assert record.read_bytes() == before
     assert import_part(file, unit="in", density=1050.0).content_hash == part.content_hash
+
+
+def test_a_mesh_on_which_coacd_crashes_is_refused_in_one_line(tmp_path):
+    cavity = trimesh.creation.box((40, 30, 10))  # as wide as the box: its walls touch
+    cavity.invert()
+    (trimesh.creation.box((40, 30, 20)) + cavity).export(tmp_path / "box.stl")
+    with pytest.raises(
+        BadPart, match=r"box.stl: CoACD, .* crashed \(exit code -11\): repair its mesh where walls"
+    ):
+        part_of_file(tmp_path / "box.stl")
