@@ -6,7 +6,8 @@ search, SIGGRAPH 2022.
 
 from __future__ import annotations
 
-import pickle
+import io
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -52,15 +53,18 @@ _LOST_SHARE = 0.4
 
 
 _PROGRAM = """
-import os, pickle, sys
-out = os.dup(1)
+import io, json, os, sys
+import numpy as np
+out = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)  # CoACD prints to standard output
 import coacd
 coacd.set_log_level("error")
-vertices, faces, settings = pickle.load(sys.stdin.buffer)
-pieces = coacd.run_coacd(coacd.Mesh(vertices, faces), **settings)
-with os.fdopen(out, "wb") as file:
-    pickle.dump([points for points, _ in pieces], file)
+mesh = np.load(io.BytesIO(sys.stdin.buffer.read()))
+pieces = coacd.run_coacd(coacd.Mesh(mesh["vertices"], mesh["faces"]), **json.loads(sys.argv[1]))
+written = io.BytesIO()
+np.savez(written, *[points for points, _ in pieces])
+out.write(written.getvalue())
+out.close()
 """
 
 
@@ -138,9 +142,11 @@ def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
         seed=0,
     )
     # In a separate process: on walls that touch CoACD may crash, and would end this one.
+    mesh = io.BytesIO()
+    np.savez(mesh, vertices=np.asarray(mesh_mm.vertices), faces=np.asarray(mesh_mm.faces))
     done = subprocess.run(
-        [sys.executable, "-I", "-c", _PROGRAM],
-        input=pickle.dumps((np.asarray(mesh_mm.vertices), np.asarray(mesh_mm.faces), settings)),
+        [sys.executable, "-I", "-c", _PROGRAM, json.dumps(settings)],
+        input=mesh.getvalue(),
         capture_output=True,
         check=False,
     )
@@ -149,7 +155,8 @@ def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
             f"CoACD, which cuts it into convex pieces, crashed (exit code {done.returncode}): repair its "
             "mesh where walls touch or coincide, or export it coarser"
         )
-    return [np.asarray(points, dtype=float) for points in pickle.loads(done.stdout)]
+    with np.load(io.BytesIO(done.stdout)) as pieces:
+        return [np.asarray(pieces[name], dtype=float) for name in pieces.files]
 
 
 def with_few_corners(pieces: Sequence[np.ndarray], most_lost_mm: float) -> Iterator[list[np.ndarray]]:
