@@ -43,7 +43,7 @@ COMPARED = [
         4,
     ),
     (
-        "en1661_flange_nut.csv",
+        "din6923_flange_nut.csv",
         "hex_nut_with_flange_parameters.csv",
         "din1665",  # so they call it
         {"dc_mm": "dc", "s_mm": "s", "c_mm": "c", "m_mm": "m"},

@@ -1,4 +1,7 @@
-"""Screws of further types from bd_warehouse, without threads; head at z = 0, shank below."""
+"""Screws of further types from bd_warehouse; head at z = 0, shank below.
+
+Threads are cylinders of their minor diameter, as bd_warehouse draws the core.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ STANDARDS = {
     "iso7045": "ISO 7045",
     "iso7380_2": "ISO 7380-2",
 }
-"""Standard of each type of the library; DIN 1662 and DIN 1665 became EN standards under the same numbers."""
+"""Standard of each type of the library; what it calls DIN 1662 and DIN 1665 are the EN standards."""
 
 _CLOSE_MM = 0.35
 _CLOSE_RATIO = 1.05

@@ -30,7 +30,7 @@ def recipes() -> Iterator[Recipe]:
     )
     yield from one_per_row("din935_castle_nut.csv", "castle_nut_m{d}", castle_nut, source="DIN 935-1")
     yield from one_per_row("square_nut.csv", "square_nut_m{d}", square_nut, source=f"{OWN}, like DIN 557")
-    yield from one_per_row("en1661_flange_nut.csv", "flange_nut_m{d}", flange_nut, source="EN 1661")
+    yield from one_per_row("din6923_flange_nut.csv", "flange_nut_m{d}", flange_nut, source="DIN 6923")
     for d in CAP_NUTS:
         yield one(table_row("din1587_cap_nut.csv", d_mm=d), "cap_nut_m{d}", cap_nut, source="DIN 1587")
     for row in table("din315_wing_nut.csv"):
