@@ -70,7 +70,7 @@ class Grip:
         off = self.tape_width - self.max_width
         width = f"width  {1e3 * self.max_width:.1f} mm by the hand, {off * 1e3:+z.1f} mm by tape"
         if abs(off) > _SAME_WIDTH:
-            width += ": measure again; do the pads of the closed hand meet?"
+            width += ": measure again, and see that the closed pads meet"
         spread = float(np.ptp(self.forces)) / self.finger_force
         force = f"force  {self.finger_force:.1f} N a pad for {self.grasp_force:g} N commanded"
         readings = ", ".join(f"{value:g}" for value in self.forces)

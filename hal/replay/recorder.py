@@ -91,6 +91,11 @@ class RecordingArm(SharingDevice, Arm):
         self._arm, self._writer = arm, writer
         self._resource = _Recorded(arm, writer)
 
+    @property
+    def may_drop(self) -> bool:
+        """See `Arm.may_drop`."""
+        return self._arm.may_drop
+
     def state(self) -> ArmState:
         """See `Arm.state`."""
         return self._writer.call("state", {}, self._arm.state)

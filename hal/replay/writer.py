@@ -49,7 +49,7 @@ class RecordingWriter:
             )
         self._table = {key: plain(value) for key, value in asdict(workspace).items()}
         self._limits = {key: plain(value) for key, value in vars(arm.limits).items()}
-        self._simulated = arm.simulated
+        self._simulated = arm.may_drop
         self._lock = threading.Lock()
         self._users = 0
         self._file: h5py.File | None = None

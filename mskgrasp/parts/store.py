@@ -203,7 +203,16 @@ def _state(folder: Path) -> tuple[int, int] | None:
 
 def _is_moved_away(folder: Path) -> bool:
     """Whether another process has moved the folder away and not put another in its place yet."""
-    return not folder.exists() and any(folder.parent.glob(f".tmp-{folder.name}-*-old"))
+    if folder.exists():
+        return False
+    moved = re.compile(rf"\.tmp-{re.escape(folder.name)}-[0-9a-f]{{12}}-\d+-old")
+    try:
+        return any(
+            moved.fullmatch(one.name) and time.time() - one.stat().st_ctime < _TRIES * _PAUSE_S
+            for one in folder.parent.iterdir()
+        )
+    except OSError:  # of that, too, it is taken away meanwhile
+        return folder.parent.is_dir()
 
 
 def _read_all(folder: Path) -> tuple[Part, dict[str, Any]]:

@@ -7,9 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import trimesh
+from pydantic import TypeAdapter, ValidationError
 
 from mskgrasp.core.config import read_yaml
-from mskgrasp.core.errors import BadPart
+from mskgrasp.core.errors import BadConfig, BadPart
 from mskgrasp.core.geometry import Pose, quat_about_z
 from mskgrasp.core.grasp import pose_base_tcp
 from mskgrasp.core.settings import REGION, TABLE_Z, Region
@@ -119,12 +120,18 @@ def region_of(folder: Path) -> Region | None:
     """Region of the simulated cell of a run: x_min, x_max, y_min, y_max, base frame, metres.
 
     None where the run is of another cell, whose file it does not hold.
+
+    Raises:
+        BadConfig: The cell's file is damaged.
     """
     path = folder / "cell.yaml"
     if not path.is_file():
         return None
-    x_min, x_max, y_min, y_max = read_yaml(path).get("region", REGION)
-    return x_min, x_max, y_min, y_max
+    region = read_yaml(path).get("region", REGION)
+    try:
+        return TypeAdapter(Region).validate_python(region)
+    except ValidationError as error:
+        raise BadConfig(f"{path}: region {region!r} is not x_min, x_max, y_min, y_max") from error
 
 
 def trial_text(trial: StoredTrial) -> str:

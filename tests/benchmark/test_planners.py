@@ -88,6 +88,11 @@ def test_an_edit_of_a_planners_code_is_noticed(edited, tmp_path: Path, monkeypat
     monkeypatch.syspath_prepend(tmp_path)
     before = package_digests(("my_planner", "ours"))
     (tmp_path / "other.py").write_text("of another package")
+    # What editors and notebooks leave in a package.
+    (tmp_path / "mine_pack" / ".#nets.py").symlink_to("nobody@nowhere")
+    (tmp_path / "mine_pack" / ".ipynb_checkpoints").mkdir()
+    (tmp_path / "mine_pack" / ".ipynb_checkpoints" / "nets.py").write_text("old")
+    (tmp_path / "mine_pack" / "folder.py").mkdir()
     assert package_digests(("my_planner", "ours")) == before
     (tmp_path / edited).write_text("edited")
     after = package_digests(("my_planner", "ours"))

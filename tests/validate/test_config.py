@@ -111,6 +111,12 @@ def test_variants_that_lift_faster_than_production_are_left_out_and_the_others_t
     assert "engine: lift at 1000 Hz" in settings_of(read_config(ValidateConfig, file))
 
 
+def test_a_variant_of_a_lower_rate_lifts_no_faster():
+    config = ValidateConfig(variants={"engine": {"slow": {"rate_hz": 250}}})
+    (slow,) = (one for one in config.settings() if one.name == "engine: slow")
+    assert slow.physics.coarse_rate_hz == slow.physics.rate_hz == 250
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

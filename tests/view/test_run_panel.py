@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.geometry import Pose
 from mskgrasp.trials.trial_files import write_trial
 from mskgrasp.view.page import Page
@@ -68,6 +69,13 @@ def test_the_region_of_a_run_is_its_cells_wherever_the_camera_is(page: Page, tmp
     panel = RunPanel(page, tmp_path, trials(tmp_path))
     panel.shown()
     assert panel.view._shown is not None and panel.view._shown.region == (0.4, 0.5, -0.1, 0.0)
+
+
+@pytest.mark.parametrize("region", ["5", "null", "[1, 2, 3]", "[a, b, c, d]"])
+def test_a_damaged_region_is_an_error_of_one_line(tmp_path: Path, region: str):
+    (tmp_path / "cell.yaml").write_text(f"region: {region}\n")
+    with pytest.raises(BadConfig, match="is not x_min, x_max, y_min, y_max$"):
+        region_of(tmp_path)
 
 
 def test_a_height_that_was_not_measured_is_said_to_be_so():

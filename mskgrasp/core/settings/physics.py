@@ -84,7 +84,7 @@ class Physics(Config):
         usual = cls.model_fields["coarse_rate_hz"].default
         if isinstance(values, dict) and values.get("coarse_rate_hz", usual) == usual:
             rate = values.get("rate_hz")
-            if isinstance(rate, int) and rate < usual:
+            if isinstance(rate, int | float) and rate < usual:
                 return values | {"coarse_rate_hz": rate}
         return values
 

@@ -152,6 +152,10 @@ def _import_one(path: Path, options: ImportOptions, taken: dict[str, Path]) -> F
         )
     except MskgraspError as error:
         return FileResult(path=path, imported=None, reason=str(error))
+    except MemoryError:
+        return FileResult(
+            path=path, imported=None, reason=f"{path} needs more memory: free some, or export it coarser"
+        )
     except OSError:
         raise  # the disk's fault, not the file's, as `read_content` has read that
     except Exception as error:  # libraries raise exceptions of many types; the other files are imported

@@ -12,7 +12,7 @@ from manifold3d import Manifold, OpType
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.importing.repair import Repairs, close_surface, count_of, wind_consistently
-from mskgrasp.parts.importing.winding import miscounted_fraction, winding_number
+from mskgrasp.parts.importing.winding import LINES, miscounted_fraction, winding_number
 from mskgrasp.parts.solids.simplify import decimate
 from mskgrasp.parts.solids.surface import Surface, joined_surfaces, manifold_of, surface_of
 
@@ -183,6 +183,8 @@ def _volumes(solids: list[Manifold]) -> str:
 
 def _check_volume(surface: Surface) -> list[str]:
     share = miscounted_fraction(surface.triangles)
+    if np.isnan(share):
+        raise BadPart(f"is thinner than 1/{LINES} of its size everywhere: make it thicker")
     if share > MISCOUNTED:
         raise BadPart(
             f"crosses itself: {100 * min(share, 9.99):.1f} % of its volume would be counted twice or as "

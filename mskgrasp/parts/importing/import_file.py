@@ -202,7 +202,7 @@ def import_command(path: Path, folder: Path | None = None) -> str:
     if folder is not None and store.stored_recipe_hash(folder) is not None:
         part, record = store.read_part_and_record(folder)
         origin = origin_of(record)
-        words += [f"--density {part.density:g}"] if part.density != STEEL else []
+        words += [f"--density {str(part.density).removesuffix('.0')}"] if part.density != STEEL else []
         words += [f"--unit {origin.unit}"] if origin and origin.unit else []
         words += [f"--{origin.bodies}"] if origin and origin.bodies != "one" else []
         words += [f"--family {shlex.quote(part.family)}"] if part.family != FAMILY else []

@@ -6,8 +6,6 @@ import numpy as np
 
 LINES = 128
 """Lines per side of the grid along each axis; a crossing smaller than 1/128 of the part may be missed."""
-_FINER = 8
-"""Times as many lines, where all lines along all axes miss the walls of a thin part."""
 
 _CHUNK = 2_000_000
 _OFFSETS = (0.1415926, -0.2182818)
@@ -36,17 +34,13 @@ def miscounted_fraction(triangles: np.ndarray) -> float:
 
     Zero where the surface does not cross itself. The winding number is followed along ``LINES`` x ``LINES``
     lines along each of the three axes; the largest of the three fractions is returned. An axis along which
-    no line meets the surface does not count; where none does, more lines are tried.
+    no line meets the surface does not count; NaN where none does.
 
     Args:
         triangles: (n, 3, 3) of a closed surface wound outwards.
     """
-    for lines in (LINES, _FINER * LINES):
-        crossings = [_crossings(triangles, axis, lines) for axis in range(3)]
-        fractions = [_miscounted(ends, steps) for ends, steps in crossings if len(ends)]
-        if fractions:
-            return max(fractions)
-    return 0.0
+    crossings = [_crossings(triangles, axis) for axis in range(3)]
+    return max((_miscounted(ends, steps) for ends, steps in crossings if len(ends)), default=np.nan)
 
 
 def _miscounted(ends: np.ndarray, steps: np.ndarray) -> float:
@@ -59,16 +53,16 @@ def _miscounted(ends: np.ndarray, steps: np.ndarray) -> float:
     return wrong / right if right > 0 else np.inf
 
 
-def _crossings(triangles: np.ndarray, axis: int, lines: int) -> tuple[np.ndarray, np.ndarray]:
+def _crossings(triangles: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
     """Crossings of lines along an axis with the surface: (m, 2) line and height; (m,) +1 in, -1 out."""
     plane = [(axis + 1) % 3, (axis + 2) % 3]
     low = triangles.reshape(-1, 3).min(axis=0)[plane]
     size = np.maximum(np.ptp(triangles.reshape(-1, 3), axis=0)[plane], 1e-300)
     # In units of the lines' spacing: line i is at i.
-    flat = (triangles[:, :, plane] - low) / size * lines - 0.5 - np.asarray(_OFFSETS)
+    flat = (triangles[:, :, plane] - low) / size * LINES - 0.5 - np.asarray(_OFFSETS)
     height = triangles[:, :, axis]
     first = np.maximum(np.ceil(flat.min(axis=1)), 0).astype(np.int64)
-    last = np.minimum(np.floor(flat.max(axis=1)), lines - 1).astype(np.int64)
+    last = np.minimum(np.floor(flat.max(axis=1)), LINES - 1).astype(np.int64)
     spans = np.maximum(last - first + 1, 0)
     counts = spans[:, 0] * spans[:, 1]
     touched = np.flatnonzero(counts)
@@ -79,20 +73,18 @@ def _crossings(triangles: np.ndarray, axis: int, lines: int) -> tuple[np.ndarray
         done = running[start - 1] if start else 0
         stop = max(int(np.searchsorted(running, done + _CHUNK)), start + 1)
         chosen = touched[start:stop]
-        found.append(_meet(flat[chosen], height[chosen], first[chosen], spans[chosen], lines))
+        found.append(_meet(flat[chosen], height[chosen], first[chosen], spans[chosen]))
         start = stop
     rows = np.concatenate(found)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     # A line through an edge to within rounding may miss both faces; such a line is dropped.
     line = rows[:, 0].astype(np.int64)
-    balance = np.bincount(line, weights=rows[:, 2], minlength=lines * lines)
+    balance = np.bincount(line, weights=rows[:, 2], minlength=LINES * LINES)
     rows = rows[balance[line] == 0]
     return rows[:, :2], rows[:, 2].astype(np.int64)
 
 
-def _meet(
-    flat: np.ndarray, height: np.ndarray, first: np.ndarray, spans: np.ndarray, lines: int
-) -> np.ndarray:
+def _meet(flat: np.ndarray, height: np.ndarray, first: np.ndarray, spans: np.ndarray) -> np.ndarray:
     """Rows (line, height, step) of the lines in each triangle's box that pass through the triangle."""
     counts = spans[:, 0] * spans[:, 1]
     owner = np.repeat(np.arange(len(flat)), counts)
@@ -106,4 +98,4 @@ def _meet(
     edge, owner, cell = edge[hit], owner[hit], cell[hit]
     total = edge.sum(axis=1)
     met = (np.roll(edge, -1, axis=1) * height[owner]).sum(axis=1) / total
-    return np.stack([cell[:, 0] * lines + cell[:, 1], met, -np.sign(total)], axis=1)
+    return np.stack([cell[:, 0] * LINES + cell[:, 1], met, -np.sign(total)], axis=1)

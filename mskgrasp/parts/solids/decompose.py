@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -52,9 +53,12 @@ _OVERLAP_MM = 0.1
 _LOST_SHARE = 0.4
 
 
+# It ends with the thread that waits for it (prctl 1: PR_SET_PDEATHSIG), also where that is killed.
 _PROGRAM = """
-import io, json, os, sys
+import ctypes, io, json, os, signal, sys
 import numpy as np
+if sys.platform == "linux":
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)
 out = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)  # CoACD prints to standard output
 import coacd
@@ -126,7 +130,8 @@ def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
     """Pieces (n, 3) of CoACD, at most ``MOST_HULLS``, of this concavity where these suffice.
 
     Raises:
-        BadPart: CoACD crashed.
+        BadPart: CoACD crashed, or was ended for lack of memory.
+        RuntimeError: It cannot be run.
     """
     settings = dict(
         threshold=concavity_mm,
@@ -145,11 +150,16 @@ def cut_up(mesh_mm: trimesh.Trimesh, concavity_mm: float) -> list[np.ndarray]:
     mesh = io.BytesIO()
     np.savez(mesh, vertices=np.asarray(mesh_mm.vertices), faces=np.asarray(mesh_mm.faces))
     done = subprocess.run(
-        [sys.executable, "-I", "-c", _PROGRAM, json.dumps(settings)],
+        [sys.executable, "-P", "-c", _PROGRAM, json.dumps(settings)],
         input=mesh.getvalue(),
         capture_output=True,
         check=False,
     )
+    if done.returncode > 0:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise RuntimeError(f"CoACD cannot be run: {said[-1] if said else done.returncode}")
+    if done.returncode == -signal.SIGKILL:
+        raise BadPart("CoACD, which cuts it into pieces, was killed: free memory, or export it coarser")
     if done.returncode:
         raise BadPart(
             f"CoACD, which cuts it into convex pieces, crashed (exit code {done.returncode}): repair its "

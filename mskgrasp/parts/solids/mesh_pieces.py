@@ -176,7 +176,7 @@ class _Search:
         return bool(pieces) and self._surface.fit_within(pieces, *bounds) is not None
 
 
-_TOO_THIN = "it is too thin for its length to be cut into solid pieces: make it thicker"
+_TOO_THIN = "it is too thin to be cut into pieces of at least 0.2 mm: make it thicker"
 _TOO_MANY = (
     f"it needs more than {MOST_MESH_HULLS} convex pieces: simplify fine detail such as threads, grilles and "
     "thin walls"

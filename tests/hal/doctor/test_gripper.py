@@ -144,7 +144,7 @@ def test_a_report_names_what_is_doubtful():
     width, speed, force, _, *simulated = grip.lines()
     cell = SapienCellConfig(type="sapien", **yaml.safe_load("\n".join(simulated)))
     assert (cell.grasp_force, cell.physics.finger_speed) == (31.0, 0.025)
-    assert "-6.0 mm by tape: other fingers" in width and "25.0 mm/s a finger, pads 50.0" in speed
+    assert "-6.0 mm by tape: measure again" in width and "25.0 mm/s a finger, pads 50.0" in speed
     assert force.startswith("force  31.0 N a pad for 30 N") and "readings differ" in force
     assert yaml.safe_load(grip.to_yaml()) == {
         "grasp_force": 30.0, "finger_force": 31.0, "finger_speed": 0.025, "max_width": 0.08,

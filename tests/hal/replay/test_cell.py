@@ -50,6 +50,9 @@ def test_what_a_program_was_refused_it_is_refused_again(tmp_path: Path, monkeypa
         monkeypatch.setattr(device, attribute, value)
         live = refused(recorded_cell(toy_cell(), tmp_path / name))
         assert refused(replayed(tmp_path / name)) is live
+        again = recorded_cell(replayed(tmp_path / name), tmp_path / f"again-{name}")
+        assert refused(again) is live
+        assert refused(replayed(tmp_path / f"again-{name}")) is live
 
 
 def test_cell_files_of_recordings_are_checked(recording: Path, tmp_path: Path):

@@ -4,6 +4,8 @@ import hashlib
 import os
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -163,3 +165,38 @@ def test_a_fit_that_stops_early_decides_as_the_whole_fit_does():
                         and whole.outward_largest <= most_outward
                     )
                     assert found == (whole if kept else None)
+
+
+@pytest.mark.slow
+def test_coacd_ends_with_the_process_that_waits_for_it():
+    code = """
+import trimesh
+from mskgrasp.parts.solids.decompose import cut_up
+mesh = trimesh.creation.torus(30, 10, major_sections=120, minor_sections=60)
+print("cutting", flush=True)
+cut_up(mesh, 0.05)
+"""
+    deadline = time.monotonic() + 60
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as waiting:
+        assert waiting.stdout is not None and waiting.stdout.readline() == b"cutting\n"
+        children = Path(f"/proc/{waiting.pid}/task/{waiting.pid}/children")
+        while not (found := children.read_text().split()) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        (child,) = found
+        time.sleep(3.0)  # until it has asked the system to be ended
+        waiting.kill()
+    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not Path(f"/proc/{child}").exists()
+
+
+def test_coacd_that_cannot_be_run_is_no_fault_of_the_mesh(monkeypatch):
+    monkeypatch.setattr(decompose, "_PROGRAM", "import no_such_module")
+    with pytest.raises(RuntimeError, match="CoACD cannot be run: .*no_such_module"):
+        decompose.cut_up(trimesh.creation.box((10, 10, 10)), 1.0)
+
+
+def test_a_mesh_on_which_coacd_is_killed_asks_for_memory(monkeypatch):
+    monkeypatch.setattr(decompose, "_PROGRAM", "import os; os.kill(os.getpid(), 9)")
+    with pytest.raises(BadPart, match="was killed: free memory"):
+        decompose.cut_up(trimesh.creation.box((10, 10, 10)), 1.0)

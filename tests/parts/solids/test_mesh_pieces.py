@@ -100,7 +100,7 @@ def test_what_no_fine_layers_represent_becomes_as_close_as_coarse_ones_are(tmp_p
     ids=["shim", "narrow shim", "foil ring", "sheet", "angle of foil", "foil"],
 )
 def test_what_is_too_thin_for_pieces_of_its_volume_is_refused(mesh):
-    with pytest.raises(BadPart, match="too thin for its length .*: make it thicker"):
+    with pytest.raises(BadPart, match="too thin .* at least 0.2 mm: make it thicker"):
         mesh_pieces(mesh)
 
 

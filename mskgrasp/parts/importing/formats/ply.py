@@ -23,6 +23,8 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_indices", "vertex_index")
+_FORMS = ([], 0), (["list"], 2)
+"""First word and number of words between ``property`` and its type: of a number and of a list."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,23 +68,27 @@ def load_ply(content: bytes) -> Loaded:
     """
     try:
         with np.errstate(all="ignore"):  # numbers that are not finite are refused later, as in all formats
-            surface, kind = _surface(content)
+            surface, kind, n_lines = _surface(content)
     except (ValueError, KeyError) as error:
         raise Unreadable(f"is not a readable PLY ({str(error)[:80]}): export or copy it again") from error
     if kind.itemsize == 4:
         check_resolution([surface])
-    return Loaded(objects=(surface,))
+    notes = (f"left out {n_lines} polygons of fewer than three corners",) if n_lines else ()
+    return Loaded(objects=(surface,), notes=notes)
 
 
-def _surface(content: bytes) -> tuple[Surface, np.dtype]:
-    """The triangles, and the type of their coordinates."""
+def _surface(content: bytes) -> tuple[Surface, np.dtype, int]:
+    """The triangles, the type of their coordinates, and how many polygons are points or lines."""
     elements, is_text, start = _header(content)
     vertex, face = elements.get("vertex"), elements.get("face")
     if vertex is None or face is None or not vertex.count or not face.count:
         raise Unreadable("holds no triangles (a point cloud?): export it from the CAD program as a mesh")
     # Where a face has nothing else, its list is that of the corners, whatever the name.
-    names = [item.name for item in face.properties]
-    index = next((name for name in _INDICES if name in names), names[0] if len(names) == 1 else None)
+    names = [item.name for item in face.properties if item.size]
+    index = next(
+        (name for name in _INDICES if name in names),
+        names[0] if names and len(face.properties) == 1 else None,
+    )
     kinds = {item.name: item.kind for item in vertex.properties}
     if index is None or not {"x", "y", "z"} <= kinds.keys():
         raise ValueError("no x, y and z of its vertices, or no vertex_indices of its faces")
@@ -96,7 +102,9 @@ def _surface(content: bytes) -> tuple[Surface, np.dtype]:
         raise ValueError("it is longer than its header states")
     axes = [columns["vertex"][axis].values.astype(kinds[axis]).astype(np.float64) for axis in "xyz"]
     points = np.stack(axes, axis=1)
-    return Surface(vertices=points, faces=_triangles(points, columns["face"][index])), kinds["x"]
+    polygons = columns["face"][index]
+    surface = Surface(vertices=points, faces=_triangles(points, polygons))
+    return surface, kinds["x"], int((polygons.sizes < 3).sum())
 
 
 def _header(content: bytes) -> tuple[dict[str, _Element], bool, int]:
@@ -112,7 +120,9 @@ def _header(content: bytes) -> tuple[dict[str, _Element], bool, int]:
                 encoding = name
             case ["element", name, count] if count.isdecimal() and name not in elements:
                 elements[name] = _Element(count=int(count), properties=[])
-            case ["property", *lists, kind, name] if encoding and elements and lists[:1] in ([], ["list"]):
+            case ["property", *lists, kind, name] if (
+                encoding and elements and (lists[:1], len(lists)) in _FORMS
+            ):
                 kinds = [np.dtype(_ORDERS[encoding] + _TYPES[one]) for one in (kind, *lists[1:])]
                 stored = [np.dtype("f8")] * len(kinds) if encoding == "ascii" else kinds
                 size = stored[1] if lists else None

@@ -155,6 +155,8 @@ def test_a_damaged_ply_is_refused(order):
         (b"double x", b"double u", "no x, y and z"),
         (b"vertex_index", b"corners", "no vertex_indices"),
         (b"double weight", b"quad weight", "'quad'"),
+        (b"list ushort short pixels", b"list ushort pixels", "its header has the line 'property list ushort"),
+        (b"property list int uint vertex_index", b"property uint vertex_index", "no vertex_indices"),
         (b"double weight", b"double texcoord", "more than once"),
         (b"ascii", b"utf-16", "its header has the line 'format utf-16 1.0'"),
         (b"end_header", b"", "no PLY header"),
