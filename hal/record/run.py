@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import yaml
@@ -69,6 +70,8 @@ def _run(config: RecordConfig, command: str) -> int:
         raise UsageError(
             f"--run {command!r}: the first word must be a program of this project, such as mskgrasp.plan"
         )
+    if find_spec(words[0]) is None:
+        raise UsageError(f"--run {command!r}: there is no program {words[0]}; python -m mskgrasp lists them")
     if any(word.split("=")[0] == "--cell" for word in words):
         raise UsageError("--run: leave out --cell, the recorded cell takes its place")
     cell_from_yaml(config.cell)  # an invalid file is reported here, not by the program

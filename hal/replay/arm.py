@@ -69,7 +69,10 @@ class ReplayArm(SharingDevice, Arm):
         event = self._playback.answer("state")
         values = event.result if event is not None else self._playback.last_state()
         if values is None:
-            raise NotRecorded(f"{self._playback.recording.path} holds no state of the arm until here")
+            raise NotRecorded(
+                f"{self._playback.recording.path} holds no state of the arm until here, for which the "
+                "program asks; start it with the options with which it was recorded"
+            )
         return arm_state(values, time.monotonic())
 
     def move_to_joints(self, joints: np.ndarray, *, speed: float = 0.3) -> None:

@@ -133,7 +133,10 @@ class Playback:
             if event.call == call and self._same(event.arguments, arguments)
         ]
         if not found:
-            raise NotRecorded(f"{self.recording.path} holds no {_words(call, arguments)}")
+            raise NotRecorded(
+                f"{self.recording.path} holds no {_words(call, arguments)}, for which the program asks; "
+                "start it with the options with which it was recorded"
+            )
         event = min(found, key=lambda one: _apart(one.arguments, arguments))
         if event.error is not None:
             raise rebuild(event.error)

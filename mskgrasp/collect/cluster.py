@@ -67,8 +67,9 @@ def connected(address: str) -> Iterator[None]:
         ray.shutdown()
         reason = " ".join(str(error).split())[:300]
         raise WorkerFailed(
-            f"cannot join the cluster at {address} ({reason}); on this machine run: "
-            f"ray start --address={'HOST:PORT' if address == 'auto' else address} --num-cpus=0"
+            f"cannot join the cluster at {address} ({reason}); on this machine start one, "
+            ".venv/bin/ray start --head --num-cpus=0, or join it, .venv/bin/ray start "
+            f"--address={'HOST:PORT' if address == 'auto' else address} --num-cpus=0"
         ) from error
     try:
         yield
@@ -85,7 +86,7 @@ def _check_reachable(address: str) -> None:
         found = getattr(error, "strerror", None) or error
         reason = "no host has such a name" if isinstance(error, UnicodeError) else found
         raise WorkerFailed(
-            f"no cluster answers at {address} ({reason}); start one with: ray start --head"
+            f"no cluster answers at {address} ({reason}); start one with: .venv/bin/ray start --head"
         ) from error
 
 

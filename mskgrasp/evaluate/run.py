@@ -203,8 +203,9 @@ def estimate(config: EvaluateConfig) -> float:
     if config.planner.policy == "certified":
         print("before them the certified grasps that are missing are made, some minutes a part")
     print(
-        f"{len(missing)} of {sum(map(len, one.tasks))} trials are missing: about {total / 3600:.1f} h with "
-        f"{n_workers} processes, if each is as fast as the one that was measured"
+        f"{len(missing)} of {sum(map(len, one.tasks))} trials are missing: about "
+        f"{f'{total / 3600:.1f} h' if total > 3600 else f'{total / 60:.1f} min'} with {n_workers} processes, "
+        "if each is as fast as the one that was measured"
     )
     return total
 

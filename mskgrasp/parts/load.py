@@ -33,6 +33,7 @@ def load_part(source: str | Path, *, unit: Unit | None = None) -> Part:
         from mskgrasp.parts.importing.import_file import part_of_file  # the readers load slowly
 
         return part_of_file(Path(source), unit=unit)
+    part = find_part(source)
     if unit is not None:
-        raise BadPart(f"{source} is no CAD file, whose unit could be {unit}: leave it away")
-    return find_part(source)
+        raise BadPart(f"{source} is no CAD file, whose unit could be {unit}: leave unit out")
+    return part

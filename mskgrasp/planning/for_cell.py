@@ -35,8 +35,8 @@ def tell_model(models: Models, cell: Cell) -> None:
         print("model: it does not tell under which conditions its labels were made")
     pose = cell.camera.T_base_camera
     height = None if pose is None else float(pose.position[2]) - cell.workspace.table_z
-    for source in models.meta.labels:
-        print(f"model: labels of {source_text(source)}")
+    for text in dict.fromkeys(map(source_text, models.meta.labels)):
+        print(f"model: labels of {text}")
     warned = {"; ".join(other_conditions(source, cell.physics, height)) for source in models.meta.labels}
     for other in sorted(warned - {""}):
         note(f"warning: the model's labels were made under other conditions: here {other}")

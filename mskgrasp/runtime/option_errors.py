@@ -60,6 +60,8 @@ def _explain(event: _errors.ParseErrorEvent, arguments: Sequence[str], legal: Se
             return f"unknown option {first}" + (f"; similar: {', '.join(similar)}" if similar else "")
         case _errors.UnrecognizedArgs(tokens=[first, *_]):
             return f"unexpected argument {first!r}"
+        case _errors.InvalidChoice(argument=argument, value=value, choices=[only]):
+            return f"{argument.display_name()} is {only!r} here; only a --config file chooses {value!r}"
         case _errors.InvalidChoice(argument=argument, value=value, choices=choices):
             return f"{argument.display_name()}: {value!r} is not legal; legal: {', '.join(choices)}"
         case _errors.BadValue(argument=argument, reason="too_few_values"):

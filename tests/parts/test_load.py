@@ -13,7 +13,7 @@ def test_a_cad_file_a_name_and_a_folder_give_the_same_part():
     assert from_file.name == "example_bracket" and 0.01 < from_file.longest_axis < 0.2
     for source in ("example_bracket", from_file.folder):
         assert load_part(source).content_hash == from_file.content_hash
-        with pytest.raises(BadPart, match="is no CAD file, whose unit could be in: leave it away"):
+        with pytest.raises(BadPart, match="is no CAD file, whose unit could be in: leave unit out"):
             load_part(source, unit="in")
     assert read_part(from_file.folder).mass == from_file.mass
 

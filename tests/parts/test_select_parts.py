@@ -46,6 +46,12 @@ def test_a_set_may_have_a_number_of_its_own():
         part_names(("train:4",), TRAINING)
 
 
+@pytest.mark.parametrize("word", ["train:x", "starter:", "test:3.5"])
+def test_what_is_no_number_after_a_set_is_named(word: str):
+    with pytest.raises(UsageError, match=f"--parts {word}: after the colon comes a number, as in train:50"):
+        part_names((word,), TRAINING)
+
+
 def test_a_file_of_names_is_those_parts(tmp_path: Path):
     (tmp_path / "known.txt").write_text("hex_nut_m30\n\nwasher_m36\n")
     words = (str(tmp_path / "known.txt"), "validation:1")

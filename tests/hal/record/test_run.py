@@ -146,6 +146,7 @@ def wait_for_frame(recording: Path) -> None:
     [
         (["--frames", "0"], 2, "greater than or equal to 1"),
         (["--run", "mskgrasp.plan 'x"], 2, "No closing quotation"),
+        (["--run", "mskgrasp.nope"], 2, "there is no program mskgrasp.nope; python -m mskgrasp lists them"),
         (["--run", "rm -r x"], 2, "the first word must be a program of this project"),
         (["--run", "mskgrasp.plan --cell a.yaml"], 2, "leave out --cell"),
         (["--cell", "none.yaml"], 2, "none.yaml"),
