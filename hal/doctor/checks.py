@@ -266,17 +266,16 @@ def check_motion(arm: Arm) -> Iterator[Finding]:
         yield Finding(level="fail", subject="joint motion", text=str(error))
         return
     try:
-        arm.open_gripper()  # some hands open a little farther than a command may ask for
-        widest = arm.state().max_width
-        half = min(widest, arm.limits.gripper.stroke) / 2
+        half = arm.state().max_width / 2
         arm.move_gripper(half)
         worst = abs(arm.state().gripper_width - half)
-        arm.open_gripper()
-        worst = max(worst, abs(arm.state().gripper_width - widest))
+        arm.open_gripper()  # some hands open a little farther than a command may ask for
+        state = arm.state()
+        worst = max(worst, abs(state.gripper_width - state.max_width))
         yield Finding(
             level="ok",
             subject="gripper",
-            text=f"{half * 1e3:.1f} and {widest * 1e3:.1f} mm: within {worst * 1e3:.2f} mm",
+            text=f"{half * 1e3:.1f} and {state.max_width * 1e3:.1f} mm: within {worst * 1e3:.2f} mm",
         )
     except HalError as error:
         yield Finding(level="fail", subject="gripper", text=str(error))
