@@ -57,12 +57,14 @@ class Workspace:
 
     def lowest_tip_z(self, xy: np.ndarray) -> np.ndarray:
         """Least z (...) of the pads' tips at points (..., 2) over the table, metres."""
-        table = plane_height(xy, self.table_z, self.table_slope, self.centre)
-        return table + self.pads_clearance
+        return self._table_at(xy) + self.pads_clearance
 
     def lowest_grasp_z(self, xy: np.ndarray) -> np.ndarray:
         """Least z (...) of grasps of the Franka Hand at points (..., 2) that keep clear of the table, m."""
-        return self.lowest_tip_z(xy) + PAD_REACH
+        return self._table_at(xy) + PAD_REACH + self.pads_clearance
+
+    def _table_at(self, xy: np.ndarray) -> np.ndarray:
+        return plane_height(xy, self.table_z, self.table_slope, self.centre)
 
 
 class PartFeeder(Protocol):
