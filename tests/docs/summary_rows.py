@@ -145,6 +145,10 @@ def _benchmark(stored: StoredReport) -> list[SummaryRow]:
         f"{corrected.value:.1%} of all attempts corrected by the prediction, {plain.value:.1%} "
         f"without; centroid and short axis {simple.value:.1%}"
     )
+    if "paper" in rows:
+        theirs = rows["paper"].first("predicted")
+        shares.append(theirs)
+        text += f"; the paper's network, corrected by its prediction, {theirs.value:.1%}"
     if "certified" in rows:
         known, known_plain = (rows["certified"].first(name) for name in ("predicted", "none"))
         shares += [known, known_plain]
