@@ -103,14 +103,12 @@ def _code_digest(module: str) -> str:
         return "not found"  # refused, with the remedy, when the planner is made
     digest = hashlib.sha256()
     folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
-    files = [(path.relative_to(one), path) for one in folders for path in one.rglob("*.py")]
-    # Not what editors and notebooks leave, as .ipynb_checkpoints.
-    hidden = [name for name, path in files if any(part.startswith(".") for part in name.parts)]
-    files = [(name, path) for name, path in files if name not in hidden and path.is_file()]
+    files = [(path.relative_to(one), path) for one in folders for path in one.rglob("*.py") if path.is_file()]
     if not folders and spec.has_location:
         files = [(Path(), Path(str(spec.origin)))]
     for name, path in sorted(files):
-        digest.update(f"{name} {file_digest(path)}\n".encode())
+        if not any(part.startswith(".") for part in name.parts):  # what editors and notebooks leave
+            digest.update(f"{name} {file_digest(path)}\n".encode())
     return digest.hexdigest()
 
 

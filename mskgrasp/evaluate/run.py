@@ -202,10 +202,10 @@ def estimate(config: EvaluateConfig) -> float:
             print(f"{n} trials {what},{like} {each:.1f} s each (of {len(measured)} measured)")
     if config.planner.policy == "certified":
         print("before them the certified grasps that are missing are made, some minutes a part")
+    duration = f"{total / 3600:.1f} h" if total > 3600 else f"{total / 60:.1f} min"
     print(
-        f"{len(missing)} of {sum(map(len, one.tasks))} trials are missing: about "
-        f"{f'{total / 3600:.1f} h' if total > 3600 else f'{total / 60:.1f} min'} with {n_workers} processes, "
-        "if each is as fast as the one that was measured"
+        f"{len(missing)} of {sum(map(len, one.tasks))} trials are missing: about {duration} with "
+        f"{n_workers} processes, if each is as fast as the one that was measured"
     )
     return total
 
