@@ -54,6 +54,11 @@ def collect(config: CollectConfig) -> None:
     parts = chosen_parts(config)
     if planner and config.planned_by is None:
         parts = restorable(parts, plan_shards(config, [part for _, part in parts]), known)
+    hashes = {part.name: part.content_hash for _, part in parts}
+    for task in plan_shards(config, [part for _, part in parts]):
+        labels = known.get((task.part, task.index))
+        if labels is not None and labels.info.part_hash == hashes[task.part]:
+            task.check_labels(labels)
     config = config.model_copy(update={"parts": tuple(word for word, _ in parts)})
     check_size(config)
     check_out(config)

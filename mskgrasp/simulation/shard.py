@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 import torch
 
-from mskgrasp.core.errors import BadDataset, NoPartFound, TableTooHigh
+from mskgrasp.core.errors import NoPartFound, TableTooHigh
 from mskgrasp.core.geometry import Pose, pose_distance
 from mskgrasp.core.grasp import HAND_GEOMETRY, MAX_DISPLACEMENT, sample_grasps
 from mskgrasp.core.seeds import scene_seeds
@@ -151,15 +151,10 @@ class Simulator:
         Raises:
             BadDataset: The labels are not those of this task.
         """
+        task.check_labels(labels)
         env = self.load(task.folder)
         columns, info = labels.columns, labels.info
         numbers = columns["attempt"]
-        within = ((task.first <= numbers) & (numbers < task.first + task.n)).all()
-        if not within or len(numbers) + sum(info.discarded.values()) != task.n or info.seed != task.seed:
-            raise BadDataset(
-                f"the labels of shard {task.index} of part '{task.part}' are not those of attempts "
-                f"{task.first} to {task.first + task.n - 1} of seed {task.seed}: use their settings"
-            )
         images = np.zeros((len(numbers), self._camera.n_pixels, self._camera.n_pixels), np.uint16)
         same = np.ones(len(numbers), dtype=bool)
         for row, (attempt, draw) in enumerate(zip(numbers.tolist(), columns["draw"].tolist(), strict=True)):

@@ -314,6 +314,7 @@ def test_a_dataset_is_made_again_from_its_labels_but_for_a_part_that_has_changed
     [
         ("all", "--seed", "6", 1, "other settings (seed differ)"),
         ("all", "--camera.height", "0.9", 1, "other settings (camera.height differ)"),
+        ("all", "--shard-size", "5", 1, "are not those of attempts 0 to 4 of seed"),
         ("none", "--seed", "5", 2, "no file of labels"),
     ],
 )
