@@ -21,6 +21,7 @@ from mskgrasp.learning.grasp_models import load_models
 from mskgrasp.parts import Part, find_part
 from mskgrasp.parts.builtin import is_known
 from mskgrasp.parts.importing.mesh_files import LOADERS
+from mskgrasp.parts.names import legal_name
 from mskgrasp.planning.certified import FILE, CertifiedGrasps
 from mskgrasp.planning.for_cell import check_unit, part_name
 from mskgrasp.planning.run_inputs import BY_CONTENT, model_digests, part_digests
@@ -115,8 +116,6 @@ def _sources(config: AssessConfig) -> list[str]:
             "name a part, a part folder, a CAD file or a folder of them: "
             "python -m mskgrasp.assess bracket.stl"
         )
-    from mskgrasp.parts.importing.import_file import legal_name  # the readers load slowly
-
     unique: dict[Path | str, str] = {}
     for text in sources:
         unique.setdefault(Path(text).resolve() if Path(text).exists() else text, text)

@@ -14,7 +14,8 @@ from torch import Tensor
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.learning.config import LearningConfig
 from mskgrasp.learning.samples import Samples
-from mskgrasp.parts.catalogue import SPLITS, Split, read_index, splits_of
+from mskgrasp.parts.catalogue import read_index, splits_of
+from mskgrasp.parts.names import SPLITS, Split
 from mskgrasp.runtime.progress import note
 
 

@@ -28,7 +28,7 @@ from mskgrasp.learning.networks import GraspQualityNetwork
 from mskgrasp.learning.samples import SAMPLES_VERSION, Samples
 from mskgrasp.learning.sides import Sides, part_sides, split
 from mskgrasp.learning.stage import Reporter, Stage
-from mskgrasp.parts.catalogue import SPLITS
+from mskgrasp.parts.names import SPLITS
 
 _LEAST_TARGET_STD = (1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3)
 """Least deviation of a target, metres and radians: less (parts that never rise) is simulation noise."""

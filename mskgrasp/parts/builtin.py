@@ -5,20 +5,18 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
-import re
 from functools import lru_cache
 from pathlib import Path
 
 from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.parts import store
+from mskgrasp.parts.names import LEGAL_NAME, legal_name
 from mskgrasp.parts.part import SCHEMA_VERSION, Part
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.recipe import Recipe
 from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
 from mskgrasp.parts.versions import PART_VERSION, stamp
 from mskgrasp.parts.write_solid import with_hulls, write_solid
-
-LEGAL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -122,11 +120,11 @@ def imported_names() -> tuple[str, ...]:
 
 def unknown_part(name: str, *, builtin_only: bool = False) -> UnknownPart:
     """The error for a name that no part has, for a part whose extra is missing, or for a CAD file."""
-    from mskgrasp.parts.importing.mesh_files import LOADERS  # needs the names of this package
+    from mskgrasp.parts.importing.mesh_files import LOADERS  # the readers load slowly
 
     if Path(name).suffix.lower() in LOADERS:
         if Path(name).is_file():
-            from mskgrasp.parts.importing.import_file import import_command, legal_name  # needs this module
+            from mskgrasp.parts.importing.origin import import_command
 
             try:
                 part = legal_name(Path(name).stem)

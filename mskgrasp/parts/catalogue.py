@@ -12,7 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mskgrasp.core.errors import BadPart, UnknownPart
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import builtin_names, recipe_hash, starter_names, unknown_part
+from mskgrasp.parts.names import SPLITS, Split
 from mskgrasp.parts.recipes import cad, families
 from mskgrasp.parts.recipes.families import VARIANT_OF
 
@@ -32,10 +33,6 @@ THIN = 0.004
 NEIGHBOUR = 1.10
 """Parts of a family whose sorted edges all differ by less than this factor are near-duplicates."""
 
-Split = Literal["train", "validation", "test", "new_sizes"]
-SPLITS: tuple[Split, ...] = ("train", "validation", "test", "new_sizes")
-SETS: tuple[str, ...] = ("starter", "catalogue", "all", *SPLITS)
-"""Words that stand for several parts, and cannot be the name of one."""
 _FAMILY_SHARES: dict[Split, float] = {"test": 0.15, "validation": 0.08}
 _KNOWN_SHARE = 0.08
 

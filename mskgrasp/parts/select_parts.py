@@ -11,12 +11,12 @@ from typing import Any
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.files import read_bounded
 from mskgrasp.parts.builtin import find_part, starter_names
-from mskgrasp.parts.catalogue import SPLITS, chosen_names
+from mskgrasp.parts.catalogue import chosen_names
+from mskgrasp.parts.names import SETS, SPLITS
 
 _MOST_BYTES = 2**20
 """Largest file of names."""
 _SO_MANY = re.compile(r"(.+):(\d+)")
-_SETS = (*SPLITS, "all", "starter", "catalogue")
 
 
 def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int = 0) -> list[str]:
@@ -52,7 +52,7 @@ def part_names(words: Iterable[str], training: Mapping[str, Any], n_parts: int =
             sets.append(unseen or [name for name in chosen_names((word,)) if name not in seen])
         elif word.endswith(".txt"):
             sets.append(chosen_names(_listed(Path(word))))
-        elif not limited and ":" in text and text.partition(":")[0] in _SETS:
+        elif not limited and ":" in text and text.partition(":")[0] in SETS:
             raise UsageError(f"--parts {text}: after the colon comes a number, as in train:50")
         else:
             sets.append(starter_names() if word == "all" else chosen_names((word,)))

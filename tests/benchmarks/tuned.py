@@ -23,7 +23,7 @@ from mskgrasp.learning.held_out import calibrate
 from mskgrasp.learning.samples import Samples, read_samples
 from mskgrasp.learning.sides import Sides
 from mskgrasp.learning.trainer import describe_networks
-from mskgrasp.parts.catalogue import SPLITS
+from mskgrasp.parts.names import SPLITS
 from mskgrasp.runtime import cli
 from mskgrasp.runtime.progress import advance_to, progress
 from tests.benchmarks.choice import Choice

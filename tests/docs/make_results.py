@@ -45,8 +45,8 @@ from mskgrasp.learning.label_source import LabelSource, source_text
 from mskgrasp.learning.model_card import result_rows
 from mskgrasp.palletize.report import result_section
 from mskgrasp.palletize.summary import PlacementSummary
-from mskgrasp.parts.catalogue import SPLITS
 from mskgrasp.parts.commands.rate import Rate
+from mskgrasp.parts.names import SPLITS
 from mskgrasp.parts.versions import PART_VERSION
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table

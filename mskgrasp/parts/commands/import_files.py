@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from mskgrasp.core.errors import BadPart, MskgraspError
 from mskgrasp.parts import store
+from mskgrasp.parts.names import legal_name
 from mskgrasp.runtime.worker_pool import Work, results
 
 if TYPE_CHECKING:
@@ -100,8 +101,6 @@ def _groups(files: Sequence[Path], options: ImportOptions) -> list[_Group]:
 
 def _key(path: Path, options: ImportOptions) -> str:
     """Shared by files whose parts may have the same name."""
-    from mskgrasp.parts.importing.import_file import legal_name
-
     try:
         name = legal_name(path.stem if options.name is None else options.name)
     except BadPart:

@@ -17,7 +17,8 @@ from mskgrasp.core.errors import BadPart, UsageError, shown
 from mskgrasp.core.files import write_whole
 from mskgrasp.parts import store
 from mskgrasp.parts.builtin import imported_names, is_built, starter_names
-from mskgrasp.parts.catalogue import SPLITS, THIN, Entry, Index, read_index
+from mskgrasp.parts.catalogue import THIN, Entry, Index, read_index
+from mskgrasp.parts.names import SPLITS
 from mskgrasp.runtime.console_table import Table, print_table
 
 

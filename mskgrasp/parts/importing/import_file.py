@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import shlex
-import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +17,13 @@ from mskgrasp.core.errors import BadPart, printable
 from mskgrasp.core.shipped import is_example
 from mskgrasp.core.units import Unit
 from mskgrasp.parts import store
-from mskgrasp.parts.builtin import LEGAL_NAME, builtin_names
-from mskgrasp.parts.catalogue import SETS
+from mskgrasp.parts.builtin import builtin_names
 from mskgrasp.parts.importing.bodies import Bodies, repair_bodies
 from mskgrasp.parts.importing.mesh_files import POSSIBLE_SIZE_MM, read_content, read_mesh
-from mskgrasp.parts.importing.origin import Origin, origin_of
+from mskgrasp.parts.importing.origin import FAMILY, NO_LICENCE, Origin, import_command, origin_of
+from mskgrasp.parts.names import SETS, legal_name
 from mskgrasp.parts.part import Part
+from mskgrasp.parts.recipes.recipe import STEEL
 from mskgrasp.parts.solids.mesh_pieces import mesh_pieces
 from mskgrasp.parts.solids.one_thread import hold_manifold_to_one_thread
 from mskgrasp.parts.solids.simplify import for_collision
@@ -33,19 +32,10 @@ from mskgrasp.parts.versions import IMPORT_VERSION, PART_VERSION, stamp
 from mskgrasp.parts.write_solid import write_solid
 from mskgrasp.runtime.progress import note
 
-STEEL = 7850.0
-"""Density of parts unless stated, kg/m^3."""
-FAMILY = "imported"
-NO_LICENCE = "NOASSERTION"
-"""Licence of parts unless stated, as SPDX writes it."""
 USUAL_DENSITY = (10.0, 25_000.0)
 """From foam to osmium, kg/m^3."""
 
 _OTHER = "choose another, python -m mskgrasp.parts import FILE --name NAME"
-
-_TRANSLITERATION = str.maketrans(
-    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "å": "aa", "æ": "ae"}
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,20 +186,6 @@ def part_of_file(path: Path, *, unit: Unit | None = None) -> Part:
     return imported.parts[0]
 
 
-def import_command(path: Path, folder: Path | None = None) -> str:
-    """The command that imports a file, with the options of a folder's part that are not the defaults."""
-    words = ["python -m mskgrasp.parts import", shlex.quote(str(path))]
-    if folder is not None and store.stored_recipe_hash(folder) is not None:
-        part, record = store.read_part_and_record(folder)
-        origin = origin_of(record)
-        words += [f"--density {str(part.density).removesuffix('.0')}"] if part.density != STEEL else []
-        words += [f"--unit {origin.unit}"] if origin and origin.unit else []
-        words += [f"--{origin.bodies}"] if origin and origin.bodies != "one" else []
-        words += [f"--family {shlex.quote(part.family)}"] if part.family != FAMILY else []
-        words += [f"--licence {shlex.quote(part.licence)}"] if part.licence != NO_LICENCE else []
-    return " ".join(words)
-
-
 def _sha256(content: bytes) -> bytes:
     return hashlib.sha256(content).digest()
 
@@ -235,20 +211,6 @@ def check_density(density: float) -> None:
             f"density {density:g} kg/m^3 is not between {USUAL_DENSITY[0]:g} and {USUAL_DENSITY[1]:g}: "
             f"steel has 7850, aluminium 2700, ABS 1050{grams}"
         )
-
-
-def legal_name(text: str) -> str:
-    """A legal part name from any text: lower case letters, digits, - and _.
-
-    Raises:
-        BadPart: The text has no legal character.
-    """
-    plain = unicodedata.normalize("NFC", text).lower().translate(_TRANSLITERATION)
-    plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
-    name = re.sub(r"[^a-z0-9_-]+", "-", plain).strip("-_")[:80].rstrip("-_")
-    if not LEGAL_NAME.fullmatch(name):
-        raise BadPart(f"no part name can be made of {text!r}: give one with --name (a-z, 0-9, - and _)")
-    return name
 
 
 def _check_available(name: str, check_name: Callable[[str], None]) -> None:

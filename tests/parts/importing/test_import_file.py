@@ -9,7 +9,8 @@ from build123d import Box, Cylinder, export_step
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import find_part
-from mskgrasp.parts.importing.import_file import import_file, import_part, legal_name
+from mskgrasp.parts.importing.import_file import import_file, import_part
+from mskgrasp.parts.names import legal_name
 
 
 def bracket() -> trimesh.Trimesh:
