@@ -13,7 +13,7 @@ rendered from ``reports/NAME.json``:
 
 Reports of evaluate, palletize, benchmark and validate are shown as their programs show them. Any other report
 has ``tables``, each with a header, rows and perhaps a title; tests.benchmarks write theirs with ``--out``. A
-run whose entry has a ``page`` adds its block to that page with its first record.
+run that is recorded for the first time needs its entry in runs.yaml, and its block on a page.
 """
 
 from __future__ import annotations
@@ -54,9 +54,8 @@ from mskgrasp.simulation.versions import SIMULATION_VERSION
 from mskgrasp.validate.engines import engine_sections
 from mskgrasp.validate.tables import label_error_section, validation_sections
 from tests.benchmarks.report import markdown_rows
-from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT
-from tests.docs.stored_reports import REPORTS, RESULTS, known_runs, read_stored
+from tests.docs.stored_reports import REPORTS, RESULTS, known_runs, page_of, read_stored
 from tests.docs.summary_rows import rows_of
 from tests.docs.summary_table import INDEX, README, with_summary
 from tests.docs.uses_of_test_parts import commit, log_use
@@ -187,8 +186,6 @@ def record(name: str) -> None:
         report.pop("trials")
     REPORTS.mkdir(exist_ok=True)
     (REPORTS / f"{name}.json").write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-    if "page" in facts:
-        add_to_page(name, facts["page"], RESULTS)
 
 
 def log_test_parts(name: str) -> None:
@@ -268,7 +265,13 @@ def main() -> int:
         "--record", nargs="+", default=[], choices=sorted(known_runs()), metavar="NAME",
         help="runs of docs/results/runs.yaml to make anew first",
     )  # fmt: skip
-    for name in parser.parse_args().record:
+    names = parser.parse_args().record
+    for name in names:  # first of all: a run may take hours
+        try:
+            page_of(name)
+        except ValueError as error:
+            parser.error(str(error))
+    for name in names:
         record(name)
         log_test_parts(name)
     for path in (*sorted(RESULTS.glob("*.md")), README):

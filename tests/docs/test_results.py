@@ -12,7 +12,6 @@ from mskgrasp.core.config import read_config
 from mskgrasp.evaluate.config import EvaluateConfig
 from tests.docs import stored_reports
 from tests.docs.make_results import FACTS, rendered
-from tests.docs.new_pages import add_to_page
 from tests.docs.pages import ROOT, without_code
 from tests.docs.stored_reports import REPORTS, StoredReport, known_runs, read_stored
 from tests.docs.summary_rows import IN_README, ROWS, rows_of
@@ -70,52 +69,7 @@ def test_a_summary_marks_the_rows_of_weights_that_ship_no_more(page: Path):
 def test_every_stored_report_is_on_a_page_and_every_run_has_one():
     stored = {path.stem for path in REPORTS.glob("*.json")}
     shown = {name for page in RESULTS for name in re.findall(r"<!-- run: (\w+) -->", page.read_text())}
-    # A run with a page of its own has none before its first record.
-    assert stored == shown >= {name for name, run in known_runs().items() if "page" not in run}
-
-
-def test_a_run_with_a_page_makes_it_with_its_first_record(tmp_path: Path):
-    index = tmp_path / "README.md"
-    index.write_text("# Results\n\n| page | measured |\n|---|---|\n| [Speed](speed.md) | speed |\n\nMore.\n")
-    runs = {name: run["page"] for name, run in known_runs().items() if "page" in run}
-    runs = {name: page for name, page in runs.items() if page["file"] == "models.md"}
-    assert list(runs) == [
-        "model_baselines",
-        "equal_recipes",
-        "paper_networks",
-        "displacement_networks",
-        "oracles",
-    ]
-    for name in (*runs, "oracles"):
-        add_to_page(name, runs[name], tmp_path)
-    text = (tmp_path / "models.md").read_text()
-    assert re.findall(r"^<!-- (.*) -->$", text, flags=re.M) == [
-        "run: model_baselines",
-        "end",
-        "run: equal_recipes",
-        "end",
-        "run: paper_networks",
-        "end",
-        "run: displacement_networks",
-        "end",
-        "run: oracles",
-        "end",
-    ]
-    assert text.startswith("# Results: models\n\n## The paper's models beside ours\n")
-    words = re.sub(r"<!-- run: .*?<!-- end -->", "", text, flags=re.S)
-    assert not re.findall(NUMBER, words)
-    rows = [line for line in index.read_text().splitlines() if line.startswith("| [")]
-    assert rows[0] == "| [Speed](speed.md) | speed |" and rows[1].startswith("| [Models](models.md) | ")
-    assert len(rows) == 2 and index.read_text().endswith("\n\nMore.\n")
-
-
-def test_a_page_holds_the_words_of_its_recorded_runs():
-    for name, run in known_runs().items():
-        page = run.get("page")
-        if page and (REPORTS / f"{name}.json").exists():
-            text = (ROOT / "docs" / "results" / page["file"]).read_text()
-            section = text.partition(f"\n## {page['heading']}\n")[2].partition("<!-- run: ")[0]
-            assert section.startswith(f"\n{page['words'].strip()}\n"), name
+    assert stored == shown >= set(known_runs())
 
 
 def test_the_index_links_every_results_page():
