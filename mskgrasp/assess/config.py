@@ -62,7 +62,7 @@ class AssessConfig(Config):
     48 convex pieces."""
     clearance: float = Field(default=TABLE_CLEARANCE, ge=TABLE_CLEARANCE, le=0.06)
     """Least distance of the pads from the table, m: `workspace.clearance` of your cell's file, which is 0.003
-    if the file does not say, and on a sloping table 0.057 times its slope more; 0.001 is that of the
+    if the file does not say, and on a sloping table 0.058 m times its slope more; 0.001 is that of the
     simulated cells."""
     workers: int = Field(default=0, ge=0)
     """Processes; 0: one per core. The results do not depend on their number."""
