@@ -152,7 +152,9 @@ def _first_section(rows: Sequence[Row], facts: RunFacts, figure: Path) -> Sectio
         )
         for row in rows
     ]
+    noise = "no noise" if facts.noise == "off" else f"{facts.noise} noise"
     text = [
+        f"In the cell {facts.cell}, whose depth images have {noise}.",
         "The share of all attempts in which the part ends within the tolerance of where it was meant to be; "
         "attempts that find no grasp, refuse the part or do not lift it count as not placed.",
         "Corrected by the planner's prediction is what was simulated and measured; a planner without one "

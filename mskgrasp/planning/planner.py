@@ -318,8 +318,10 @@ def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:
 def variance_score(mean: np.ndarray, variance: np.ndarray, grasps: np.ndarray, view: PartView) -> np.ndarray:
     """Compute var_x + var_y + var_z + r^2 (var_theta + E |swing|^2) of the seen centre, square metres.
 
-    With r the part's radius of gyration it is, to first order, the mean squared distance by which the part's
-    points miss the places where they were to be: predicted ones, and flat as the part lay.
+    With r the part's radius of gyration, seen from above, it is to first order the mean squared distance by
+    which the part's points miss the places where they were to be: predicted ones, and flat as the part lay.
+    A swing is weighted as if the points lay r from its axis: that of a flat part counts twice, that of a tall
+    one too little.
 
     Args:
         mean: (..., k) of the grasp displacement and, with k = 6, the swing.

@@ -39,13 +39,17 @@ class SummaryRow:
     n: str = ""
 
 
+def _exact(stored: StoredReport) -> str:
+    """That depth images had no noise; runs with it name it in their command."""
+    return "" if "--noise" in stored.facts["command"] else ", no sensor noise"
+
+
 def _success(stored: StoredReport) -> list[SummaryRow]:
     found = _report(stored)["overall"]
-    exact = ", no sensor noise" if stored.name in ("success", "success_full") else ""
     return [
         SummaryRow(
             name="best quality",
-            text=f"{found['success_rate']:.1%} lifted{exact} "
+            text=f"{found['success_rate']:.1%} lifted{_exact(stored)} "
             f"(paper in simulation: {_report(stored)['paper']['simulated']:.1%})",
             interval=_between(found["success_interval"], 100, "%"),
         ),
@@ -57,6 +61,23 @@ def _success(stored: StoredReport) -> list[SummaryRow]:
             n=f"{found['measured']} trials of {found['measured_parts']} parts that were lifted",
         ),
     ]
+
+
+def _success_elsewhere(where: str) -> Callable[[StoredReport], list[SummaryRow]]:
+    """A row of grasps of the best quality, under other conditions."""
+
+    def rows(stored: StoredReport) -> list[SummaryRow]:
+        found = _report(stored)["overall"]
+        return [
+            SummaryRow(
+                name=f"best quality, {where}",
+                text=f"{found['success_rate']:.1%} lifted; displacement RMSE {_rmse(found)} "
+                f"(predicting zero: {_rmse(found, '_of_zero')})",
+                interval=f"{_between(found['success_interval'], 100, '%')}; {_rmse_intervals(found)}",
+            )
+        ]
+
+    return rows
 
 
 def _rmse(statistics: dict[str, Any], of: str = "") -> str:
@@ -83,7 +104,7 @@ def _displacement_row(stored: StoredReport, policy: str, name: str, theirs: str 
     both, novel, best = model[policy]["all"], model[policy]["novel"], model["quality"]["all"]
     return SummaryRow(
         name=name,
-        text=f"{both['success_rate']:.1%} lifted (best quality in the same scenes: "
+        text=f"{both['success_rate']:.1%} lifted{_exact(stored)} (best quality in the same scenes: "
         f"{best['success_rate']:.1%}); displacement RMSE {_rmse(both)} "
         f"(predicting zero: {_rmse(both, '_of_zero')}{theirs}); "
         f"novel parts alone: {novel['success_rate']:.1%}, {_rmse(novel)}",
@@ -143,13 +164,14 @@ def _benchmark(stored: StoredReport) -> list[SummaryRow]:
     shares = [corrected, plain, simple]
     text = (
         f"{corrected.value:.1%} of all attempts corrected by the prediction, {plain.value:.1%} "
-        f"without; centroid and short axis {simple.value:.1%}"
+        f"without{_exact(stored)}; centroid and short axis {simple.value:.1%}"
     )
     if "paper" in rows:
         theirs = rows["paper"].first("predicted")
         shares.append(theirs)
         text += (
-            f"; the paper's network, from far fewer attempts, corrected by its prediction, {theirs.value:.1%}"
+            "; the paper's network and choice of grasps, from far fewer attempts, corrected by its "
+            f"prediction, {theirs.value:.1%}"
         )
     if "certified" in rows:
         known, known_plain = (rows["certified"].first(name) for name in ("predicted", "none"))
@@ -181,7 +203,7 @@ def _palletize(stored: StoredReport) -> list[SummaryRow]:
         SummaryRow(
             name="placing, grasps of best quality" if stored.name == "palletize_quality" else "placing",
             text=f"median error {corrected} corrected by the prediction; {plain} without; {true} corrected "
-            f"by the true displacement; corrected by the prediction it is {gain['translation_ratio']:.2f} of "
+            f"by the true displacement{_exact(stored)}; corrected by the prediction it is {gain['translation_ratio']:.2f} of "
             f"that without (goal: {GOAL:g} at most, {met})",
             interval="; ".join(_between(one["median_translation_interval"], 1e3, "mm", 2) for one in each)
             + f"; ratio {_between(gain['translation_ratio_interval'], 1, '', 2).rstrip()}",
@@ -309,7 +331,8 @@ def _against(report: dict[str, Any], setting: str, reference: str, name: str) ->
         f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
         interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
         f"{_between((success['low'], success['high']), 100, 'points')}",
-        n=f"{found['n']} grasps of {success['parts']} parts, {shift['n']} lifted in both",
+        n=f"{found['n']} grasps of {success['parts']} parts; {shift['n']} of {shift['parts']} parts lifted in "
+        "both and from the moved starts",
     )
 
 
@@ -380,6 +403,9 @@ def _between(ends: Any, scale: float, unit: str, digits: int = 1) -> str:
 
 ROWS: tuple[tuple[str, Callable[[StoredReport], list[SummaryRow]]], ...] = (
     ("success", _success),
+    ("success_kinect2", _success_elsewhere("with the noise of a Kinect v2")),
+    ("success_iid", _success_elsewhere("with independent noise of every pixel")),
+    ("success_mujoco", _success_elsewhere("in MuJoCo")),
     ("displacement", _displacement),
     ("displacement_mujoco", _displacement_elsewhere("in MuJoCo")),
     ("displacement_kinect2", _displacement_elsewhere("with the noise of a Kinect v2")),
@@ -436,6 +462,7 @@ def rows_of(stored: StoredReport) -> list[SummaryRow]:
 
 IN_README = (
     "success",
+    "success_kinect2",
     "displacement",
     "displacement_mujoco",
     "displacement_kinect2",

@@ -19,6 +19,8 @@ README = ROOT / "README.md"
 INDEX = RESULTS / "README.md"
 FORMER = " (with the weights that shipped before)"
 """Mark of a row."""
+WILSON = " (share by Wilson's, too narrow where parts are alike)"
+"""Mark of an interval that was recorded before those of docs/results/intervals.md."""
 SUPERSEDED = "Recorded before "
 """Beginning of a note in a stored record which names a change of the code since."""
 HEADER = ("result", "split", "n", "interval", "command")
@@ -68,5 +70,6 @@ def _line(row: SummaryRow, stored: StoredReport, page: str) -> str:
         first += "; recorded before a later change (see its page)"
     if stored.of_former_model:
         first += FORMER
-    cells = (first, row.split or facts["split"], row.n or facts["n"], row.interval, facts["command"])
+    interval = row.interval + WILSON * facts["intervals"].startswith("95 %: Wilson")
+    cells = (first, row.split or facts["split"], row.n or facts["n"], interval, facts["command"])
     return "| " + " | ".join(cells) + " |"

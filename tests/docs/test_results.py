@@ -135,10 +135,13 @@ def test_the_readme_states_the_share_placed_and_that_of_a_simple_planner():
         return dict(planner=planner, n_parts=4, lifted=share, within=within, reasons={}, wrong_pose=0)
 
     report = dict(rows=[row("centroid", 4), row("ours", 18)])
-    (found,) = dict(ROWS)["benchmark"](StoredReport(name="benchmark", facts={}, report=report))
-    assert found.text.startswith("90.0% of all attempts corrected by the prediction, 90.0% without; centroid")
+    (found,) = dict(ROWS)["benchmark"](StoredReport(name="benchmark", facts=dict(command=""), report=report))
+    shares = "90.0% of all attempts corrected by the prediction, 90.0% without"
+    assert found.text.startswith(f"{shares}, no sensor noise; centroid")
+    noisy = StoredReport(name="benchmark", facts=dict(command="--noise kinect2"), report=report)
+    assert dict(ROWS)["benchmark"](noisy)[0].text.startswith(f"{shares}; centroid")
     assert found.interval.count("10.0 - 90.0 %") == 3 and found.n == "20 attempts at 4 parts by each planner"
-    stored = StoredReport(name="benchmark_mujoco", facts={}, report=report)
+    stored = StoredReport(name="benchmark_mujoco", facts=dict(command=""), report=report)
     (other,) = dict(ROWS)["benchmark_mujoco"](stored)
     assert other.name == f"{found.name}, in MuJoCo" and other.text == found.text
 
