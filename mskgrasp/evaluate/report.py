@@ -48,7 +48,8 @@ _INTERVALS_EXPLAINED = (
 )
 _COMPARISON_EXPLAINED = (
     f"{_ERRORS_EXPLAINED} In brackets: 95 % interval over parts. Inside 90 % interval: share of the measured "
-    "values within 1.645 predicted standard deviations, the mean over dx, dy, dz and the turn. Known parts are those a model was trained on."
+    "values within 1.645 predicted standard deviations, the mean over dx, dy, dz and the turn. Known parts "
+    "are those a model was trained on."
 )
 
 

@@ -72,6 +72,7 @@ def test_the_noise_of_a_cells_file_is_named(trials, tmp_path):
     facts = replace(facts_of(PARTS[:1]), cell="my.yaml", noise="kinect2", settings=dict(noise=None))
     headline, sections = write_report(tmp_path, trials, facts)
     assert headline.endswith("in the cell my.yaml with kinect2 noise.")
+    assert sections[0].text[0] == "In the cell my.yaml, whose depth images have kinect2 noise."
     assert ("noise", "kinect2") in sections[-1].tables[0].rows
 
 
@@ -94,9 +95,7 @@ def test_the_tables_say_which_parts_can_be_bought_and_what_was_known(written):
     assert table.rows[0] == ("nut", "nut", "ISO 4032", "test", "5 of 5", "0 of 5")
     assert table.rows[1][2] == "-"
     first = sections["Placed within 1 mm and 2 degrees"]
-    assert first.text[0].startswith("In the cell ") and first.text[0].endswith(
-        "depth images have kinect2 noise."
-    )
+    assert first.text[0].endswith(", whose depth images have no noise.")
     assert first.text[3:] == [
         "The networks of ours were trained on 1 of these parts.",
         "The networks of certified were chosen (early stopping) and calibrated by 2 of these parts.",

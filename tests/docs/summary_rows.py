@@ -203,8 +203,8 @@ def _palletize(stored: StoredReport) -> list[SummaryRow]:
         SummaryRow(
             name="placing, grasps of best quality" if stored.name == "palletize_quality" else "placing",
             text=f"median error {corrected} corrected by the prediction; {plain} without; {true} corrected "
-            f"by the true displacement{_exact(stored)}; corrected by the prediction it is {gain['translation_ratio']:.2f} of "
-            f"that without (goal: {GOAL:g} at most, {met})",
+            f"by the true displacement{_exact(stored)}; corrected by the prediction it is "
+            f"{gain['translation_ratio']:.2f} of that without (goal: {GOAL:g} at most, {met})",
             interval="; ".join(_between(one["median_translation_interval"], 1e3, "mm", 2) for one in each)
             + f"; ratio {_between(gain['translation_ratio_interval'], 1, '', 2).rstrip()}",
             n=f"{report['compared']} placements of {report['parts_compared']} parts for each correction",
@@ -331,8 +331,8 @@ def _against(report: dict[str, Any], setting: str, reference: str, name: str) ->
         f"{1e3 * shift['margin']:g} mm and {100 * success['margin']:g} points is {shown}",
         interval=f"90 %: {_between((shift['low'], shift['high']), 1e3, 'mm', digits=2)}, "
         f"{_between((success['low'], success['high']), 100, 'points')}",
-        n=f"{found['n']} grasps of {success['parts']} parts; {shift['n']} of {shift['parts']} parts lifted in "
-        "both and from the moved starts",
+        n=f"{found['n']} grasps of {success['parts']} parts; {shift['n']} of {shift['parts']} parts lifted "
+        "in both and from the moved starts",
     )
 
 
