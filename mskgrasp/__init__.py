@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mskgrasp.core.lazy_names import lazy_names
+from mskgrasp.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from hal import Arm, Camera, Cell, RgbdFrame, Workspace, execute_grasp, open_cell
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from mskgrasp.planning.grasp_plan import GraspPlan
     from mskgrasp.planning.place_pose import Target, place_pose
     from mskgrasp.planning.planner import Planner
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Arm", "Attempts", "Camera", "Cell", "Dataset", "Grasp", "GraspPlan", "Models", "MskgraspError", "Part",

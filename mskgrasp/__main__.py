@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from mskgrasp import __version__
+from mskgrasp.core.version import __version__
 from mskgrasp.runtime.cli import run
 from mskgrasp.runtime.ctrl_c import ctrl_c_deferred
 from mskgrasp.runtime.programs import GROUPS, PROGRAMS

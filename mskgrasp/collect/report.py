@@ -16,8 +16,8 @@ from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.metrics import wilson_interval
 from mskgrasp.dataset import ShardInfo, list_shards, read_shard
 from mskgrasp.dataset.shards import read_columns, success_rate
+from mskgrasp.planning.grasp_figures import draw_contact_sheet
 from mskgrasp.reports.console import print_sections
-from mskgrasp.reports.grasp_figures import draw_contact_sheet
 from mskgrasp.reports.section import Section
 from mskgrasp.runtime.console_table import Table
 

@@ -14,8 +14,8 @@ from mskgrasp.demo.config import DemoConfig
 from mskgrasp.parts import find_part
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner, part_name, present
+from mskgrasp.planning.grasp_figures import draw_plan
 from mskgrasp.planning.grasp_plan import GraspPlan
-from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
 from mskgrasp.runtime.progress import progress
 

@@ -11,7 +11,7 @@ import numpy as np
 from hal.camera import RgbdFrame
 from mskgrasp.core.errors import UsageError
 from mskgrasp.evaluate.summary import displacement_errors
-from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.planning.grasp_figures import draw_plan
 from mskgrasp.reports.quantities import degrees, millimetres
 from mskgrasp.reports.style import saved_figure
 from mskgrasp.runtime.run_folder import TRIALS, read_trials

@@ -17,7 +17,7 @@ from mskgrasp.palletize.height_maps import HeightMaps
 from mskgrasp.palletize.pallet_slots import Slot
 from mskgrasp.palletize.placement_records import CORRECTIONS, Correction, Placement
 from mskgrasp.palletize.summary import Group, compared_groups, corrections_of
-from mskgrasp.reports.grasp_figures import draw_jaw, show_heights
+from mskgrasp.planning.grasp_figures import draw_jaw, show_heights
 from mskgrasp.reports.style import saved_figure
 
 COLOURS: dict[Correction, str] = {"none": FAINT, "predicted": BLUE, "truth": GREEN}

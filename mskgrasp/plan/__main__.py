@@ -22,7 +22,7 @@ def main() -> int:
     config = parse(PlanConfig, prog="python -m mskgrasp.plan", description=DESCRIPTION)
     with ctrl_c_deferred():  # not for a mistyped option
         from mskgrasp.plan.run import plan_grasp
-        from mskgrasp.reports.plan_text import plan_text
+        from mskgrasp.planning.plan_text import plan_text
     print(plan_text(plan_grasp(config)))
     print(f"wrote {config.out / 'plan.json'} and {config.out / 'plan.png'}")
     return 0

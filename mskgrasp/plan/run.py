@@ -15,8 +15,8 @@ from mskgrasp.parts import find_part
 from mskgrasp.plan.config import PlanConfig
 from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.for_cell import make_planner, part_name, present, tell_model
+from mskgrasp.planning.grasp_figures import draw_plan
 from mskgrasp.planning.grasp_plan import GraspPlan
-from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.runtime.cli import make_folder
 
 

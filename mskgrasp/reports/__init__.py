@@ -1,1 +1,1 @@
-"""Figures of grasps and HTML reports."""
+"""Sections of reports, shown as an HTML page or on the console, and the style of figures."""

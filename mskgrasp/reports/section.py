@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import mskgrasp
+from mskgrasp.core.version import __version__
 from mskgrasp.runtime.console_table import Table
 
 _PACKAGES = ("torch", "sapien", "mani_skill", "mujoco", "numpy", "opencv-python-headless")
@@ -70,7 +70,7 @@ class Section:
 def settings_section(settings: Mapping[str, object], versions: Mapping[str, object] | None = None) -> Section:
     """A section with a run's settings and software versions, by default those of this process."""
     if versions is None:
-        versions = {"mskgrasp": mskgrasp.__version__, "python": platform.python_version()}
+        versions = {"mskgrasp": __version__, "python": platform.python_version()}
         versions |= {name: importlib.metadata.version(name) for name in _PACKAGES if _installed(name)}
     return Section(
         title="Settings and versions",

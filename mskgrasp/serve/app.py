@@ -14,7 +14,7 @@ from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from mskgrasp import __version__
+from mskgrasp.core.version import __version__
 from mskgrasp.serve.answers import place_answer
 from mskgrasp.serve.dispatcher import Dispatcher
 from mskgrasp.serve.rejection import Rejected, error_body

@@ -14,10 +14,10 @@ import numpy as np
 
 from hal.cell import Workspace
 from hal.config import SimulatedCellConfig
-from mskgrasp import __version__
 from mskgrasp.core.errors import UsageError
 from mskgrasp.core.grasp import HAND_GEOMETRY
 from mskgrasp.core.settings import TABLE_Z
+from mskgrasp.core.version import __version__
 from mskgrasp.learning.grasp_models import DESCRIPTION, read_meta, require_hand, require_model
 from mskgrasp.planning.run_inputs import model_digests
 from mskgrasp.runtime.address import is_local, listening

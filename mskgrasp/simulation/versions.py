@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 
-import mskgrasp
+from mskgrasp.core.version import __version__
 
 SIMULATION_VERSION = 4
 """Raised by every change after which a seed makes other attempts; `tests/versions.py` names the files."""
@@ -20,7 +20,7 @@ def versions() -> dict[str, str]:
     found = {name: importlib.metadata.version(name) for name in packages}
     return dict(
         found,
-        mskgrasp=mskgrasp.__version__,
+        mskgrasp=__version__,
         simulation=str(SIMULATION_VERSION),
         python=platform.python_version(),
     )

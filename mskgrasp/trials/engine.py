@@ -39,9 +39,9 @@ from mskgrasp.dataset import DEPTH_UNIT, depth_to_u16, u16_to_depth
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.markers import Markers, find_markers
 from mskgrasp.perception.tallest import tallest_thing
+from mskgrasp.planning.grasp_figures import draw_plan
 from mskgrasp.planning.grasp_plan import GraspPlan
 from mskgrasp.planning.place_pose import displacement_of_point
-from mskgrasp.reports.grasp_figures import draw_plan
 from mskgrasp.trials.trial import REFUSED, reason_of
 
 _MAX_DEPTH = np.iinfo(np.uint16).max * DEPTH_UNIT

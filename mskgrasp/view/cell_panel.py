@@ -17,7 +17,7 @@ from mskgrasp.parts import Part, find_part
 from mskgrasp.planning.certified_planner import planner_of_part
 from mskgrasp.planning.for_cell import make_planner, present
 from mskgrasp.planning.grasp_plan import GraspPlan
-from mskgrasp.reports.plan_text import plan_text
+from mskgrasp.planning.plan_text import plan_text
 from mskgrasp.trials.engine import TrialEngine
 from mskgrasp.view.config import ViewConfig
 from mskgrasp.view.dataset_panel import shift_text

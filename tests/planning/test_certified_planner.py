@@ -24,8 +24,8 @@ from mskgrasp.planning.certified_planner import (
 )
 from mskgrasp.planning.config import PlannerConfig
 from mskgrasp.planning.for_cell import make_planner
+from mskgrasp.planning.plan_text import plan_text
 from mskgrasp.planning.planner import Planner
-from mskgrasp.reports.plan_text import plan_text
 from tests.perception.part_pose.cells import prepared
 from tests.planning.test_certified import certified, certified_grasp
 

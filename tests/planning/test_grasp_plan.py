@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mskgrasp.core.grasp import centre_in_grasp_frame
-from mskgrasp.reports.grasp_figures import draw_plan
+from mskgrasp.planning.grasp_figures import draw_plan
 from tests.planning.hand_made import FRAME, planner
 
 

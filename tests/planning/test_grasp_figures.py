@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import colors
 
 from mskgrasp.core.palette import GREEN, RED
-from mskgrasp.reports.grasp_figures import draw_contact_sheet
+from mskgrasp.planning.grasp_figures import draw_contact_sheet
 from tests import synthetic
 
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from mskgrasp.reports.plan_text import plan_text, verdict
+from mskgrasp.planning.plan_text import plan_text, verdict
 from tests.planning.hand_made import FRAME, planner
 
 
