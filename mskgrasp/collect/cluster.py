@@ -16,7 +16,7 @@ from typing import Any
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.node import PackedPart, RunSettings, ShardReply, make_shard, settings_digest
-from mskgrasp.collect.workers import ShardEvents, task_name
+from mskgrasp.collect.workers import ShardEvents, leave_out, task_name
 from mskgrasp.core.errors import UsageError
 from mskgrasp.dataset import shard_path
 from mskgrasp.parts import Part
@@ -194,7 +194,7 @@ def make_shards_on_cluster(
             del packed[task.part]
         return started
 
-    remedy = "leave the part out with --parts, or repair the nodes"
+    remedy = f"repair the nodes and run the same command again, {leave_out(config.out)}"
     return run_jobs(tasks, RayExecutor(start, config.workers), name=task_name, remedy=remedy)
 
 

@@ -81,7 +81,8 @@ def check_labels(info: ShardInfo, config: CollectConfig) -> None:
     """Refuse labels of other settings, or of another simulation.
 
     Raises:
-        BadDataset: They differ.
+        UsageError: They are of other settings.
+        BadDataset: They are of another version of the simulation.
     """
     name = f"labels of shard {info.index} of part '{info.part}'"
     settings = dict(
@@ -94,7 +95,7 @@ def check_labels(info: ShardInfo, config: CollectConfig) -> None:
     if info.T_base_camera.position[2] != config.camera.height:
         changed.append("camera.height")
     if changed:
-        raise BadDataset(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
+        raise UsageError(f"{name} were made with other settings ({', '.join(changed)} differ); use those")
     if info.versions.get("simulation") != str(SIMULATION_VERSION):
         raise BadDataset(
             f"{name} are of simulation version {info.versions.get('simulation')}, not {SIMULATION_VERSION}: "

@@ -20,7 +20,7 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.collect.known_labels import check_labels, chosen_by, restorable
 from mskgrasp.collect.workers import make_shards
 from mskgrasp.core.config import read_config, write_config
-from mskgrasp.core.errors import BadConfig, BadDataset, BadPart, UsageError
+from mskgrasp.core.errors import BadConfig, BadDataset, UsageError
 from mskgrasp.core.files import LOCK, exclusive_lock
 from mskgrasp.dataset import read_shard, read_success, shard_path
 from mskgrasp.dataset.labels import ShardLabels, read_labels
@@ -51,6 +51,7 @@ def collect(config: CollectConfig) -> None:
     if config.sample:
         names = sampled(names, config.sample)
     config = config.model_copy(update={"parts": tuple(names), "sample": 0})
+    check_out(config, parts_chosen=False)  # before parts are built, which takes minutes
     parts = chosen_parts(config)
     if planner and config.planned_by is None:
         parts = restorable(parts, plan_shards(config, [part for _, part in parts]), known)
@@ -67,6 +68,7 @@ def collect(config: CollectConfig) -> None:
         with exclusive_lock(config.out) as alone:
             if not alone:
                 raise UsageError(f"another collection is writing into {config.out}; wait for it, or stop it")
+            check_out(config)  # once more: another may have begun and ended since
             _collect(config, [part for _, part in parts], known, planner)
 
 
@@ -190,14 +192,18 @@ def chosen_parts(config: CollectConfig) -> list[tuple[str, Part]]:
     names = [part.name for _, part in parts]
     doubles = sorted({name for name in names if names.count(name) > 1})
     if doubles:
-        raise BadPart(f"two parts are called '{doubles[0]}'; give each its own name")
+        raise UsageError(f"two parts are called '{doubles[0]}'; give each its own name")
     if not parts:
-        raise BadPart("no part is left to collect; widen part_filter")
+        raise UsageError("no part is left to collect; widen part_filter")
     return parts
 
 
-def check_out(config: CollectConfig) -> None:
+def check_out(config: CollectConfig, *, parts_chosen: bool = True) -> None:
     """Refuse an output folder that holds something else; change nothing.
+
+    Args:
+        config: Settings.
+        parts_chosen: Whether its parts are those that are collected, none of which may be another.
 
     Raises:
         UsageError: A file is in the way, or the folder has other settings, or is no dataset.
@@ -215,7 +221,7 @@ def check_out(config: CollectConfig) -> None:
     except BadConfig as error:
         raise UsageError(f"{error}; choose another --out") from error
     now = config.identity()
-    changed = [key for key in now if now[key] != before[key]]
+    changed = [key for key in now if now[key] != before[key] and (parts_chosen or key != "parts")]
     if changed:
         raise UsageError(
             f"{config.out} was made with other settings ({', '.join(changed)} differ); choose another "
@@ -233,7 +239,7 @@ def prepare_folder(config: CollectConfig) -> None:
         write_config(config, config.out / "config.yaml")
     # After the settings: they mark a folder with other files as a dataset.
     make_folder(config.out / "shards")
-    for leftover in (*config.out.glob("config.yaml.*.tmp"), *(config.out / "shards").glob("*.tmp")):
+    for leftover in (*config.out.glob("*.tmp"), *(config.out / "shards").glob("*.tmp")):
         leftover.unlink(missing_ok=True)  # a worker of that run may be about to delete it itself
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +11,7 @@ from mskgrasp.collect.config import CollectConfig
 from mskgrasp.dataset.labels import read_labels
 from mskgrasp.parts.store import read_record
 from mskgrasp.runtime.local_executor import LocalExecutor
-from mskgrasp.runtime.worker_pool import JobDone, JobLost, JobResult, run_jobs
+from mskgrasp.runtime.worker_pool import REMEDY, JobDone, JobLost, JobResult, run_jobs
 from mskgrasp.simulation.shard_task import ShardTask
 
 ShardEvents = Generator[JobResult[ShardTask, int] | JobDone[ShardTask] | JobLost[ShardTask], None, None]
@@ -24,7 +25,16 @@ def make_shards(config: CollectConfig, tasks: Sequence[ShardTask], n_workers: in
         WorkerFailed: A shard failed for a reason that trying again does not remove.
     """
     executor = LocalExecutor(_shard_maker, config, n_workers)
-    return run_jobs(tasks, executor, name=task_name, remedy="leave the part out with --parts")
+    return run_jobs(tasks, executor, name=task_name, remedy=f"{REMEDY}; {leave_out(config.out)}")
+
+
+def leave_out(out: Path) -> str:
+    """How a collection goes on without a part: its settings are fixed, but for those in its own file."""
+    settings = out / "config.yaml"
+    return (
+        f"or go on without the part: remove its name from {settings}, then python -m mskgrasp.collect "
+        f"--config {shlex.quote(str(settings))} --out {shlex.quote(str(out))}"
+    )
 
 
 def task_name(task: ShardTask) -> str:

@@ -102,6 +102,9 @@ def exclusive_lock(folder: Path) -> Iterator[bool]:
     """Lock a folder until the end of the block; give False if another process holds the lock.
 
     The operating system releases the lock when a process ends for whatever reason; its empty file remains.
+
+    Raises:
+        OSError: The file system has no locks, or the folder is not writable.
     """
     with open(Path(folder) / LOCK, "w", encoding="utf-8") as file:
         try:
@@ -109,4 +112,7 @@ def exclusive_lock(folder: Path) -> Iterator[bool]:
         except BlockingIOError:
             yield False
             return
+        except OSError as error:  # such as NFS without its lock daemon
+            remedy = "this file system has no locks; choose a folder on another, or mount it with locks"
+            raise OSError(error.errno, f"{error.strerror}: {remedy}", str(folder)) from error
         yield True

@@ -149,7 +149,7 @@ class Simulator:
         pose stands on one machine alone, the attempt is discarded.
 
         Raises:
-            BadDataset: The labels are not those of this task.
+            UsageError: The labels are not those of this task.
         """
         task.check_labels(labels)
         env = self.load(task.folder)
@@ -164,7 +164,9 @@ class Simulator:
         for _ in range(task.n - len(numbers)):
             yield -1
         if not same.all():
-            info = replace(info, discarded=info.discarded | {"lies_otherwise": int((~same).sum())})
+            # Labels that were restored before may count such attempts already.
+            discarded = Counter(info.discarded) + Counter(lies_otherwise=int((~same).sum()))
+            info = replace(info, discarded=dict(discarded))
         attempts = Attempts(depth=images[same], **{name: values[same] for name, values in columns.items()})
         write_shard(shard_path(dataset, task.part, task.index), attempts, info)
 

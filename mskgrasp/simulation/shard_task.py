@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.errors import UsageError
 from mskgrasp.dataset.labels import ShardLabels
 
 
@@ -32,13 +32,13 @@ class ShardTask:
         """Refuse labels of other attempts.
 
         Raises:
-            BadDataset: They are not those of this shard.
+            UsageError: They are not those of this shard.
         """
         numbers = labels.columns["attempt"]
         within = ((self.first <= numbers) & (numbers < self.first + self.n)).all()
         made = len(numbers) + sum(labels.info.discarded.values())
         if not within or made != self.n or labels.info.seed != self.seed:
-            raise BadDataset(
+            raise UsageError(
                 f"the labels of shard {self.index} of part '{self.part}' are not those of attempts "
                 f"{self.first} to {self.first + self.n - 1} of seed {self.seed}: use the settings they were "
                 "made with"

@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, model_validator
 from mskgrasp.core.config import Config, check_config
 from mskgrasp.core.errors import BadConfig
 from mskgrasp.core.settings import Physics
-from mskgrasp.core.settings.physics import LEAST_RATE_HZ
+from mskgrasp.core.settings.physics import LEAST_RATE_HZ, MOST_ITERATIONS
 
 Engine = Literal["sapien", "mujoco"]
 
@@ -76,7 +76,7 @@ class Reference(Config):
 
     rate_hz: int
     """Steps a second."""
-    position_iterations: int
+    position_iterations: int = Field(le=MOST_ITERATIONS)
     """Solver iterations a step."""
     grasps_per_part: int = Field(ge=1)
     """Grasps of each part; at most as many are compared with it."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,9 +20,12 @@ import pytest
 import trimesh
 import yaml
 
+from mskgrasp.collect import run
 from mskgrasp.collect.__main__ import main
 from mskgrasp.collect.config import CollectConfig, PartFilter
 from mskgrasp.collect.run import check_out, chosen_parts, is_done
+from mskgrasp.collect.workers import leave_out
+from mskgrasp.core.config import read_config, write_config
 from mskgrasp.core.errors import BadDataset, UsageError
 from mskgrasp.core.files import exclusive_lock
 from mskgrasp.core.shipped import PRETRAINED
@@ -271,6 +277,44 @@ def test_two_collections_do_not_write_into_one_folder(collected, tmp_path):
 
 
 @pytest.mark.slow
+def test_settings_that_another_run_has_written_meanwhile_are_seen(tmp_path, monkeypatch):
+    out = tmp_path / "data"
+
+    @contextmanager
+    def after_another(folder: Path) -> Iterator[bool]:
+        another = read_config(CollectConfig, tmp_path / "small.yaml").model_copy(update={"seed": 6})
+        write_config(another, out / "config.yaml")
+        with exclusive_lock(folder) as alone:
+            yield alone
+
+    monkeypatch.setattr(run, "exclusive_lock", after_another)
+    done = run_here(main, *arguments(out))
+    assert done.returncode == 2 and "made with other settings (seed differ)" in done.stderr
+    assert not (out / "shards").exists()
+
+
+def test_a_wrong_folder_is_refused_before_parts_are_built(tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "chosen_parts", lambda config: pytest.fail("parts are built"))
+    (tmp_path / "notes.txt").touch()
+    done = run_here(main, *arguments(tmp_path / "notes.txt"))
+    assert done.returncode == 2 and "is a file; choose a folder" in done.stderr
+
+
+def test_a_collection_goes_on_without_a_part_as_its_error_says(collected, tmp_path):
+    out = tmp_path / "data"
+    shutil.copytree(collected, out)
+    lost = PARTS[0]
+    for path in (out / "shards").glob(f"{lost}-*"):
+        path.unlink()
+    assert str(out / "config.yaml") in leave_out(out)
+    settings = yaml.safe_load((out / "config.yaml").read_text())
+    settings["parts"].remove(lost)
+    (out / "config.yaml").write_text(yaml.safe_dump(settings))
+    done = run_here(main, *shlex.split(leave_out(out).partition("mskgrasp.collect ")[2]))
+    assert done.returncode == 0, done.stderr
+    assert f"1 parts, 6 attempts into {out}, 6 of them already there" in done.stdout
+
+
 def test_parts_that_the_first_shard_shows_outside_the_filter_get_no_further_shards(collected, tmp_path):
     export_labels(collected, tmp_path / "all.labels")
     rates = {part: read_success(shard_path(collected, part, 0))[0].mean() for part in PARTS}
@@ -312,9 +356,9 @@ def test_a_dataset_is_made_again_from_its_labels_but_for_a_part_that_has_changed
 @pytest.mark.parametrize(
     ("labels", "option", "value", "code", "message"),
     [
-        ("all", "--seed", "6", 1, "other settings (seed differ)"),
-        ("all", "--camera.height", "0.9", 1, "other settings (camera.height differ)"),
-        ("all", "--shard-size", "5", 1, "are not those of attempts 0 to 4 of seed"),
+        ("all", "--seed", "6", 2, "other settings (seed differ)"),
+        ("all", "--camera.height", "0.9", 2, "other settings (camera.height differ)"),
+        ("all", "--shard-size", "5", 2, "are not those of attempts 0 to 4 of seed"),
         ("none", "--seed", "5", 2, "no file of labels"),
     ],
 )

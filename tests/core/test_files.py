@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from mskgrasp.core import files
 from mskgrasp.core.files import LOCK, is_leftover, read_bounded, require_space, write_figure, write_whole
 
 
@@ -113,3 +115,14 @@ def test_a_figure_is_written_in_the_format_of_its_suffix_and_an_error_names_it(t
     with pytest.raises(OSError) as raised:
         write_figure(figure, tmp_path / "none" / "one.png")
     assert raised.value.filename == str(tmp_path / "none" / "one.png")
+
+
+def test_a_file_system_without_locks_is_named_with_a_remedy(tmp_path, monkeypatch):
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(files.fcntl, "flock", no_locks)
+    with pytest.raises(OSError, match="has no locks; choose a folder on another") as raised, \
+         files.exclusive_lock(tmp_path):  # fmt: skip
+        pass
+    assert raised.value.filename == str(tmp_path)

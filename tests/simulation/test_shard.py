@@ -12,7 +12,7 @@ import torch
 
 from mskgrasp.collect.config import CollectConfig
 from mskgrasp.core.config import read_config
-from mskgrasp.core.errors import BadDataset
+from mskgrasp.core.errors import UsageError
 from mskgrasp.core.grasp import MAX_DISPLACEMENT, lowest_grasp_z
 from mskgrasp.core.settings import REGION, TABLE_Z, ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import list_shards, read_shard
@@ -63,7 +63,7 @@ def test_a_shard_is_made_again_from_its_labels_and_its_seed(
     assert attempts.displacement == pytest.approx(before.displacement, abs=3e-6, nan_ok=True)
     assert info.discarded == info_before.discarded and info.versions == info_before.versions
     assert [one for one in yields if one >= 0] == before.success.astype(int).tolist()
-    with pytest.raises(BadDataset, match="not those of attempts 0 to 2"):
+    with pytest.raises(UsageError, match="not those of attempts 0 to 2"):
         list(simulator.restore(dataclasses.replace(task, first=0), labels, tmp_path))
 
 
@@ -84,6 +84,15 @@ def test_an_attempt_whose_scene_comes_out_differently_is_discarded(
         np.array_equal(attempts.depth, before.depth[1:]) and len(attempts) + sum(info.discarded.values()) == 3
     )
     assert len(yields) == 3 and yields[0] == -1
+    # Labels of a dataset that was restored so count one already: their shard is as whole as any.
+    export_labels(tmp_path, tmp_path / "restored.labels")
+    restored = read_labels([tmp_path / "restored.labels"])[PART, 1]
+    poses = restored.columns["pose_base_obj"].copy()
+    poses[0, 0] += 0.01
+    elsewhere = dataclasses.replace(restored, columns=restored.columns | {"pose_base_obj": poses})
+    list(simulator.restore(task, elsewhere, tmp_path / "again"))
+    attempts, info = read_shard(list_shards(tmp_path / "again")[0])
+    assert info.discarded["lies_otherwise"] == 2 and len(attempts) + sum(info.discarded.values()) == 3
 
 
 def test_force_and_friction_of_each_attempt_are_those_that_were_drawn(tmp_path: Path):

@@ -13,6 +13,8 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.grasp import HOLD_S
 
 LEAST_RATE_HZ = 250
+MOST_ITERATIONS = 255
+"""SAPIEN keeps the number in eight bits: 256 would be none."""
 
 
 class Physics(Config):
@@ -23,13 +25,13 @@ class Physics(Config):
     fingers, and no data is collected."""
     coarse_rate_hz: int = Field(default=500, ge=100)
     """Steps a second, at most ``rate_hz``, during lift and hold, and while a part that is not held comes to
-    rest; its default is lowered with ``rate_hz``. The first 6 mm of the lift, in which the part leaves the
-    table, and the last 20 ms before the part's pose in the hand is measured use ``rate_hz``, as does the
-    simulated cell (`hal.sim`) unless nothing can touch its hand. At 250 Hz parts swing in the hand, by up to
-    13 degrees more than at 1000 Hz."""
-    position_iterations: int = Field(default=50, ge=4)
+    rest; 500, stated or not, is lowered with ``rate_hz``. The first 6 mm of the lift, in which the part
+    leaves the table, and the last 20 ms before the part's pose in the hand is measured use ``rate_hz``, as
+    does the simulated cell (`hal.sim`) unless nothing can touch its hand. At 250 Hz parts swing in the hand,
+    by up to 13 degrees more than at 1000 Hz."""
+    position_iterations: int = Field(default=50, ge=4, le=MOST_ITERATIONS)
     """Solver iterations a step; `validate` compares them."""
-    hold_iterations: int = Field(default=50, ge=4)
+    hold_iterations: int = Field(default=50, ge=4, le=MOST_ITERATIONS)
     """The same, if more, while a part is lifted and held: with fewer, some parts swing in the hand that
     friction holds, such as a bolt that hangs from one point of each pad; finer steps change nothing."""
     contact_offset: float = Field(default=0.001, gt=0, le=0.02)

@@ -38,6 +38,7 @@ def test_settings_are_read_back_equal_from_what_a_shard_stores():
     [
         dict(rate_hz=99), dict(position_iterations=3), dict(finger_force=71), dict(finger_speed=0),
         dict(hold_s=0.1), dict(lift_height=0.31), dict(contact_offset=0), dict(friction=0.5),
+        dict(position_iterations=256), dict(hold_iterations=256),
     ],
 )  # fmt: skip
 def test_what_the_arm_or_the_engine_cannot_do_is_refused(values: dict[str, float]):
