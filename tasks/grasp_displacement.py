@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,6 +28,7 @@ from mskgrasp.parts import Part, find_part, starter_names
 from mskgrasp.parts.hulls import hull_corners
 from mskgrasp.parts.resting_pose import random_resting_pose
 from tasks.attempt.attempt import Attempt
+from tasks.checks import check_region, check_reset, check_tops, grasps_of, poses_of
 from tasks.robot.contacts import HandContacts
 from tasks.robot.motion import PandaMotion
 from tasks.robot.panda import GraspPanda, panda_for
@@ -82,7 +84,7 @@ class GraspDisplacementEnv(BaseEnv):
     def __init__(
         self,
         *args: Any,
-        parts: list[str] | None = None,
+        parts: Sequence[str] | None = None,
         physics: dict | None = None,
         camera: dict | None = None,
         noise: dict | None = None,
@@ -105,7 +107,8 @@ class GraspDisplacementEnv(BaseEnv):
             **kwargs: Passed to ManiSkill.
 
         Raises:
-            BadConfig: An override is not valid, or its noise cannot be simulated.
+            BadConfig: An override is not valid, its noise cannot be simulated, the camera does not see the
+                region, or there is no GPU for several sub-scenes.
             BadPart: A part is unknown or damaged.
         """
         if robot_uids != "panda_grasp":
@@ -115,9 +118,14 @@ class GraspDisplacementEnv(BaseEnv):
         self.noise = check_config(ExecutionNoise, noise or {}, "noise")
         self._check_noise(num_envs)
         self.region = tuple(region)
+        check_region(self.overhead, self.region)
+        if num_envs > 1 and not torch.cuda.is_available():
+            raise BadConfig(
+                f"num_envs: {num_envs} scenes need PhysX on a GPU, and CUDA is not available; use 1"
+            )
         self.intrinsics = self.overhead.intrinsics()
         self.T_base_camera = self.overhead.T_base_camera(self.region_centre)
-        self._part_names = list(parts) if parts else None
+        self._part_names = [parts] if isinstance(parts, str) else list(parts) if parts else None
         self._n_scenes = num_envs
         # ManiSkill sizes PhysX's buffers once: every sub-scene has room for the most complex of these parts.
         names = self._part_names or []
@@ -175,6 +183,7 @@ class GraspDisplacementEnv(BaseEnv):
         if names is None:
             names = [str(name) for name in self._batched_episode_rng.choice(list(starter_names()))]
         self.parts = [find_part(names[i % len(names)]) for i in range(self.num_envs)]
+        check_tops(self.overhead, self.parts)
         most = max(self.parts, key=lambda part: part.n_hulls)
         if self.gpu_sim_enabled and most.n_hulls > self._most_hulls:
             raise BadConfig(
@@ -228,11 +237,12 @@ class GraspDisplacementEnv(BaseEnv):
         return TableFriction(self.scene.px, part, table, self.physics.friction_table_part)
 
     def _initialize_episode(self, env_idx: Tensor, options: dict) -> None:
-        if options.get("parts") and not options.get("reconfigure"):
-            raise BadConfig("options: other parts are loaded with reconfigure=True alone; add it")
+        check_reset(options)
         self._outcome = None
         given = options.get("pose_base_obj")
-        if given is None:
+        if given is not None:
+            given = poses_of(given, len(env_idx))
+        else:
             rows = [
                 random_resting_pose(
                     self.standing[i].poses,
@@ -244,7 +254,7 @@ class GraspDisplacementEnv(BaseEnv):
                 for i in env_idx.tolist()
             ]
             given = np.stack(rows)
-        pose = torch.as_tensor(np.asarray(given), dtype=torch.float32, device=self.device).reshape(-1, 7)
+        pose = torch.as_tensor(given, dtype=torch.float32, device=self.device)
         self._resting_z[env_idx] = pose[:, 2]
         self.part.set_pose(ManiSkillPose.create_from_pq(to_world(pose[:, :3]), pose[:, 3:]))
         if self._friction is not None:
@@ -374,7 +384,7 @@ class GraspDisplacementEnv(BaseEnv):
         if self.agent.control_mode != "grasp" or action is None:
             self._outcome = None
             return super()._step_action(action)
-        grasp = torch.as_tensor(action, dtype=torch.float32, device=self.device).reshape(-1, 4)
+        grasp = grasps_of(torch.as_tensor(action, dtype=torch.float32, device=self.device), self.num_envs)
         self._outcome = self.try_grasp(grasp)
         return grasp
 

@@ -28,9 +28,9 @@ _HEADER = (
 )  # fmt: skip
 _EXPLAINED = (
     "Success: share of the attempts that lifted the part. Median displacement and turn: of the part in the "
-    "hand, over the attempts that lifted it. Discarded attempts are not counted; an unsettled one was drawn "
-    "again. The part filter compares the success in a part's first shard with part_filter.min_success and "
-    "max_success."
+    "hand, over the attempts that lifted it. Discarded attempts are not counted; a scene whose part was "
+    "not at rest was drawn again first, several times. The part filter compares the success in a part's "
+    "first shard with part_filter.min_success and max_success."
 )
 
 Columns = dict[str, np.ndarray]
@@ -51,6 +51,7 @@ class PartSummary:
         median_tilt: Median tilt over successes, radians; None without any.
         failures: Number of failures by reason.
         discarded: Number of discarded attempts by reason; not among the attempts.
+        redrawn: Number of scenes drawn again because the part was not at rest.
         kept: Whether the part passes the filter on the success rate of its first shard.
     """
 
@@ -64,6 +65,7 @@ class PartSummary:
     median_tilt: float | None
     failures: dict[str, int]
     discarded: dict[str, int]
+    redrawn: int
     kept: bool
 
 
@@ -100,6 +102,7 @@ def _summarise_part(
         median_tilt=_median(tilt),
         failures={FAILURES[code]: int(n) for code, n in enumerate(np.bincount(failure)) if code and n},
         discarded=dict(discarded),
+        redrawn=sum(info.redrawn for _, info in shards),
         kept=part_filter.takes_success(success_rate(first)),
     )
 

@@ -44,6 +44,7 @@ class Card:
         families: By name, sorted.
         failures: Attempts that failed, by reason.
         discarded: Discarded attempts, by reason; not among the attempts.
+        redrawn: Number of scenes drawn again because the part was not at rest.
         displacement: Median and 90th percentile of the translation over successes, metres; None without.
         turn: The same of |dtheta|, radians.
         image: Height and width of a depth image, pixels.
@@ -61,6 +62,7 @@ class Card:
     families: dict[str, Family]
     failures: dict[str, int]
     discarded: dict[str, int]
+    redrawn: int
     displacement: tuple[float, float] | None
     turn: tuple[float, float] | None
     image: tuple[int, int]
@@ -99,7 +101,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
     versions: Counter[tuple[tuple[str, str], ...]] = Counter()
     moved: list[np.ndarray] = []
     paths = list_shards(folder)
-    size, info, image = 0, None, (0, 0)
+    size, redrawn, info, image = 0, 0, None, (0, 0)
     for path in watch(paths):
         columns, info = read_columns(path, ("success", "failure", "displacement"))
         codes = columns["failure"]
@@ -109,6 +111,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         won[info.family][info.part] += int(columns["success"].sum())
         failures.update(columns["failure"][~columns["success"]].tolist())
         discarded.update(info.discarded)
+        redrawn += info.redrawn
         versions[tuple(sorted(info.versions.items()))] += 1
         moved.append(columns["displacement"][columns["success"]])
         size += path.stat().st_size
@@ -125,6 +128,7 @@ def read_card(folder: Path, watch: Callable[[Sequence[Path]], Iterable[Path]] = 
         },
         failures={FAILURES[code]: n for code, n in failures.most_common()},
         discarded=dict(discarded.most_common()),
+        redrawn=redrawn,
         displacement=_median_and_tail(np.linalg.norm(held[:, :3], axis=1)),
         turn=_median_and_tail(np.abs(held[:, 3])),
         image=image,
@@ -171,9 +175,10 @@ def tables(card: Card) -> list[CardTable]:
         ]
     simulations = {names.get("simulation", "unknown") for names, _ in card.versions}
     facts += [
-        ("error of a label", read_label_error(simulations)),
+        ("error of a label", read_label_error(simulations, card.physics)),
         ("depth images", f"{card.image[1]} x {card.image[0]} pixels, uint16, 0.1 mm"),
         ("seed", f"{card.seed}"),
+        ("scenes drawn again", f"{card.redrawn}, as the part was not at rest"),
         ("on disk", f"{card.shards} shards, {_bytes(card.size)}, {_bytes(card.size / max(n, 1))} an attempt"),
     ]
     by_family = [

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+from mskgrasp.core.settings import Physics
 
 STORED = Path(__file__).with_suffix(".json")
 """Written by ``make results ARGS="--record label_error"``, which runs `mskgrasp.validate`."""
@@ -43,10 +45,20 @@ class LabelError:
         )
 
 
-def read_label_error(simulations: Collection[str], path: Path = STORED) -> str:
-    """The error of labels of some versions of the simulation, in words."""
+def read_label_error(simulations: Collection[str], physics: Mapping[str, object], path: Path = STORED) -> str:
+    """The error of labels of some versions of the simulation, in words.
+
+    Args:
+        simulations: Versions of the simulation.
+        physics: Its settings; the error is known of production's, the defaults.
+        path: The file with the error.
+    """
     found = LabelError(**json.loads(path.read_text(encoding="utf-8")))
     if set(simulations) != {found.simulation}:
         made = ", ".join(sorted(simulations)) or "unknown"
         return f"not known: made by simulation version {made}, measured for {found.simulation}"
+    production = Physics().model_dump()
+    other = [name for name in production if physics.get(name, production[name]) != production[name]]
+    if other:
+        return f"not known: measured for production's settings, of which {', '.join(other)} differ"
     return str(found)

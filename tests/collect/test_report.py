@@ -40,7 +40,11 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pose_tcp_obj_after=plain.pose_tcp_obj_before,
     )  # fmt: skip
     write_shard(shard_path(folder, "a", 0), rows(attempts, slice(0, 3)), synthetic.info("a"))
-    write_shard(shard_path(folder, "a", 1), rows(attempts, slice(3, 5)), synthetic.info("a", 1))
+    write_shard(
+        shard_path(folder, "a", 1),
+        rows(attempts, slice(3, 5)),
+        dataclasses.replace(synthetic.info("a", 1), redrawn=7),
+    )
     write_shard(shard_path(folder, "b", 0), rows(attempts, slice(5, 7)), synthetic.info("b"))
     return folder
 
@@ -53,6 +57,7 @@ def test_a_part_is_summed_up_over_its_shards(dataset: Path):
     assert a.median_displacement == pytest.approx(0.005) and a.median_turn == pytest.approx(0.2)
     assert a.median_tilt == pytest.approx(0.02)
     assert a.failures == {"missed": 1, "slipped": 1} and a.discarded == {"unsettled": 2}
+    assert a.redrawn == 7
     # Wilson (1927) for 3 of 5, as tabulated.
     assert a.success_interval == pytest.approx((0.231, 0.882), abs=1e-3)
     assert (b.successes, b.median_displacement, b.kept) == (0, None, False)

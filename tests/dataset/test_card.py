@@ -31,7 +31,7 @@ def test_the_card_counts_what_the_shards_hold(collected):
 
 def test_intervals_are_by_parts_at_which_attempts_are_alike():
     facts = dict(tables(card_of(won=(40, 0, 40, 0), tried=(40, 40, 40, 40)))[0][2])
-    assert facts["success"].startswith("50.0% (")
+    assert facts["success"].startswith("50.0% (") and facts["scenes drawn again"].startswith("7, ")
     assert facts["grasps"] == "chosen by the planner of model 0123"
     low, high = re.findall(r"([\d.]+)%", facts["success"])[1:]
     # Jeffreys's interval of two of four parts is 12 to 88 %; by attempts it would be 42.3 to 57.7 %.
@@ -41,8 +41,8 @@ def test_intervals_are_by_parts_at_which_attempts_are_alike():
 def card_of(won: tuple[int, ...], tried: tuple[int, ...]) -> Card:
     return Card(
         name="made", shards=4, parts=len(won), families={"nut": Family(won=won, tried=tried)}, failures={},
-        discarded={}, displacement=None, turn=None, image=(2, 2), seed=0, planner="0123", physics={},
-        noise={}, versions=[], size=1,
+        discarded={}, redrawn=7, displacement=None, turn=None, image=(2, 2), seed=0, planner="0123",
+        physics={}, noise={}, versions=[], size=1,
     )  # fmt: skip
 
 

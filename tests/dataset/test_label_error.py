@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mskgrasp.core.settings import Physics
 from mskgrasp.dataset import read_shard, shard_path, write_shard
 from mskgrasp.dataset.card import read_card, tables
 from mskgrasp.dataset.label_error import STORED, LabelError, read_label_error
@@ -48,7 +49,14 @@ def test_it_is_stated_only_for_the_simulation_it_was_measured_with(
 ):
     path = tmp_path / "label_error.json"
     path.write_text(json.dumps(asdict(MADE_UP)))
-    assert read_label_error(made_by, path).startswith(words)
+    physics = Physics().model_dump()
+    assert read_label_error(made_by, physics, path).startswith(words)
+    other = physics | {"position_iterations": 4, "finger_force": 70.0}
+    if words.startswith("median"):
+        words = (
+            "not known: measured for production's settings, of which position_iterations, finger_force differ"
+        )
+    assert read_label_error(made_by, other, path).startswith(words)
 
 
 def test_the_card_states_it_for_data_of_the_simulation_it_was_measured_with(tmp_path: Path):

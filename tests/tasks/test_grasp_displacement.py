@@ -179,3 +179,43 @@ def test_on_a_gpu_a_part_of_more_hulls_than_there_is_room_for_is_refused(boxes, 
 def test_other_parts_without_a_new_scene_are_refused(env):
     with pytest.raises(BadConfig, match="other parts are loaded with reconfigure=True alone"):
         env.reset(seed=0, options=dict(parts=["hex_nut_m30"]))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (dict(pose_base_objct=[0.5, 0, 0.02, 1, 0, 0, 0]), "options: no pose_base_objct; legal: parts, "),
+        (dict(pose_base_obj=[0.5, 0, 0.02, 0, 0, 0, 0]), r"must have length 1, got \[0.0\]"),
+        (dict(pose_base_obj=[0.5, 0, 0.02, 2, 0, 0, 0]), r"must have length 1, got \[2.0\]"),
+        (dict(pose_base_obj=[0.5, 0, float("nan"), 1, 0, 0, 0]), "1 finite poses x y z qw qx qy qz"),
+        (dict(pose_base_obj=[[0.5, 0, 0.02, 1, 0, 0, 0]] * 2), r"got an array \(2, 7\)"),
+    ],
+)
+def test_an_option_of_a_reset_that_is_wrong_is_named(boxes, options, message):
+    env = make(boxes, obs_mode="none")
+    env.reset(seed=0)
+    with pytest.raises(BadConfig, match=message):
+        env.reset(options=options)
+    with pytest.raises(BadConfig, match=r"is \(1, 4\), x y z theta; got \(2, 4\)"):
+        env.unwrapped.step(np.zeros((2, 4)))
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (dict(region=(0.2, 1.2, -0.6, 0.6)), "the camera sees 0.35 m of the table, less than the region"),
+        (dict(region=(0.6, 0.4, -0.1, 0.1)), "region must be x_min < x_max"),
+        (
+            dict(camera=dict(height=0.31, n_pixels=424), parts=["l_bracket_140x60"]),
+            "camera.height 0.31 is too low for l_bracket_140x60, of up to 0.140 m: at least 0.34",
+        ),
+        pytest.param(
+            dict(num_envs=2), "2 scenes need PhysX on a GPU",
+            marks=pytest.mark.skipif(torch.cuda.is_available(), reason="this machine has a GPU"),
+        ),
+    ],
+)  # fmt: skip
+def test_what_the_camera_or_the_machine_cannot_do_is_refused_when_the_task_is_made(boxes, settings, message):
+    with pytest.raises(BadConfig, match=message):
+        make(boxes, obs_mode="none", **settings)
