@@ -63,7 +63,7 @@ MIN_RISE = 0.8
 HOLD_S = 0.2
 """Time for which a lifted part is held before it is judged, seconds."""
 MAX_DISPLACEMENT = 0.05
-"""Largest displacement of a held part in the hand, metres; a row with a larger one is not used as a label."""
+"""Largest displacement of a held part in the hand, metres; an attempt with a larger one is discarded."""
 TILT_LIMIT = float(np.radians(2.0))
 """A part that tilts by more in the hand counts as tilted, radians."""
 EJECTED_DISTANCE = 0.05

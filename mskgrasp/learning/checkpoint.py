@@ -22,7 +22,7 @@ class Checkpoint:
     """State after a finished epoch.
 
     Attributes:
-        fingerprint: Fingerprint of the data; training does not resume with other data.
+        fingerprint: Digest of the data's grasps and outcomes; training does not resume with others.
         samples_version: Version of the samples made from the data; 1 in files that do not name it.
         sides: Digest of the split (`Sides.digest`); empty in files that do not name it.
         stage: Network that is being trained.

@@ -45,7 +45,7 @@ class StageConfig(Config):
 
 
 class LearningConfig(Config):
-    """Settings of training; the same settings, data and device type give the same model."""
+    """Settings of training; with the same data, device type and threads they give the same model."""
 
     seed: int = Field(default=0, ge=0, lt=2**63)
     sides: Literal["name", "catalogue"] = "name"
@@ -74,6 +74,9 @@ class LearningConfig(Config):
 
     @model_validator(mode="after")
     def _check(self) -> LearningConfig:
+        low, high = self.success_range
+        if not 0 <= low <= high <= 1:
+            raise ValueError(f"success_range: {low:g} to {high:g} must be shares from low to high, 0 to 1")
         if self.symmetric and self.network.sees_object:
             raise ValueError(
                 "symmetric: true needs patches that are rotated with the grasp; with image: object none are"

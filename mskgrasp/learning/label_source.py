@@ -104,6 +104,8 @@ def other_conditions(source: LabelSource, physics: Config | None, camera_height:
     for name, value in ({} if physics is None else physics.model_dump()).items():
         drawn = source.noise.get(name)
         low, high = drawn if isinstance(drawn, (list, tuple)) else 2 * (source.physics.get(name),)
-        if isinstance(value, float) and low is not None and high is not None and not low <= value <= high:
+        if name == "skip_air" or low is None or high is None:  # skipping air changes no label
+            continue
+        if not low <= value <= high:
             found.append(f"{name} {value:g}, not {low:g}" + (f" to {high:g}" if high > low else ""))
     return found

@@ -64,7 +64,7 @@ class Samples:
         parts: Names of the parts.
         skipped: Number of unusable attempts by reason: the planner would find no part in them either, or the
             part was not at rest.
-        fingerprint: Hex digest of grasps and outcomes; equal digests mean equal data.
+        fingerprint: Hex digest of grasps and outcomes; images and poses do not enter it.
         sources: Simulations and settings that the labels come from; a sound dataset has one.
     """
 

@@ -148,7 +148,7 @@ class Stage:
                 break
             found = self.epoch(number, reporter)
             history.append(found)
-            if not self.config.keep_best or found.validation_loss <= min(earlier, default=math.inf):
+            if not self.config.keep_best or found.validation_loss < min(earlier, default=math.inf):
                 best = {key: value.detach().clone() for key, value in self.network.state_dict().items()}
             save(number + 1, best)
             reporter.epoch(history)

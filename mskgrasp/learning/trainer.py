@@ -1,7 +1,4 @@
-"""Training of the GQN and then of the GDN, which resumes from a checkpoint with identical results.
-
-In between, if asked for, the layers of the GDN learn the quality, from attempts that failed, too.
-"""
+"""Training of the GQN and then of the GDN, which resumes from a checkpoint with identical results."""
 
 from __future__ import annotations
 

@@ -163,12 +163,21 @@ class CertifiedPlanner:
         # Over the stated height of the table, which a hand can touch: a camera's depth may be off by more.
         vectors = to_base(T_base_rest, np.stack([one.grasp for one in grasps]), planner.table_z)
         vectors[:, 2] += planner.rise(vectors[:, :2])
-        certified_z = vectors[:, 2].copy()
-        high_enough = planner.cleared(vectors)[:, 2] - certified_z <= MOST_RAISED
+        cleared = planner.cleared(vectors)
+        high_enough = cleared[:, 2] - vectors[:, 2] <= MOST_RAISED
+        vectors = cleared
         radius = radius_about_vertical(part, found.resting)
         facing = float(twist_and_swing(T_base_rest.quat_wxyz)[0])
-        scores = np.array(
-            [one.score(_turned_covariance(found.covariance, facing + one.grasp[3]), radius) for one in grasps]
+        alike = np.diag(SIMULATED_ALIKE)
+        scores = (
+            alike[:3].sum()
+            + radius**2 * alike[3]
+            + np.array(
+                [
+                    one.score(_turned_covariance(found.covariance, facing + one.grasp[3]), radius)
+                    for one in grasps
+                ]
+            )
         )
         order = np.argsort(scores, kind="stable")
         fit = (row for row in order if high_enough[row] and self._reachable(Grasp.from_vector(vectors[row])))

@@ -303,10 +303,11 @@ class Planner:
         return self._lowest_grasp_z(xy)
 
     def cleared(self, grasps: np.ndarray) -> np.ndarray:
-        """Raise grasps (n, 4) whose pads would be too near the table."""
-        if self._lowest_grasp_z is not None:
-            grasps[:, 2] = np.maximum(grasps[:, 2], self._lowest_grasp_z(grasps[:, :2]))
-        return grasps
+        """Grasps (n, 4), raised where their pads would be too near the table."""
+        if self._lowest_grasp_z is None:
+            return grasps
+        z = np.maximum(grasps[:, 2], self._lowest_grasp_z(grasps[:, :2]))
+        return np.column_stack([grasps[:, :2], z, grasps[:, 3]])
 
 
 def shortlist(qualities: np.ndarray, top_fraction: float) -> np.ndarray:

@@ -26,6 +26,7 @@ from hal.camera import RgbdFrame
 from hal.cell import Workspace
 from mskgrasp.core.errors import BadPlanner, NoGraspFound
 from mskgrasp.core.grasp import Grasp
+from mskgrasp.core.json_text import parse_json
 from mskgrasp.planning.proposal import ProposedGrasp
 
 TIMEOUT_S = 60.0
@@ -73,6 +74,8 @@ class ProgramPlanner:
         self._process: subprocess.Popen[str] | None = None
         self._watch: subprocess.Popen[bytes] | None = None
         self._lines: queue.Queue[str | None] = queue.Queue()
+        self._late = ""
+        """Why it was ended here, which holds for every later request, too."""
         self._log = tempfile.TemporaryFile()
         self._folder = tempfile.TemporaryDirectory()
 
@@ -87,7 +90,7 @@ class ProgramPlanner:
         write_frame(path, frame, self._workspace)
         line = self._ask(json.dumps({"frame": str(path), "seed": int(rng.integers(2**31))}))
         try:
-            return _proposed(json.loads(line))
+            return _proposed(parse_json(line))
         except (ValueError, TypeError, LookupError, AttributeError) as error:
             shown = line.strip()[:200]
             raise BadPlanner(
@@ -116,6 +119,8 @@ class ProgramPlanner:
         self._folder.cleanup()
 
     def _ask(self, request: str) -> str:
+        if self._late:
+            raise BadPlanner(self._late)
         process = self._started()
         assert process.stdin is not None
         if not self._lines.empty():  # would be taken for the answer to this request, and so on
@@ -133,10 +138,11 @@ class ProgramPlanner:
             line = self._lines.get(timeout=self._timeout_s)
         except queue.Empty:
             _kill(process)
-            raise BadPlanner(
+            self._late = (
                 f"the program {self._command!r} did not answer within {self._timeout_s:g} s; does it flush "
                 "its output?"
-            ) from None
+            )
+            raise BadPlanner(self._late) from None
         except OSError:
             line = None
         if line is None:
@@ -197,7 +203,7 @@ def _kill(process: subprocess.Popen[str]) -> None:
 def _proposed(values: dict[str, Any]) -> ProposedGrasp:
     refused = values.get("refused")
     if refused is not None:
-        if not isinstance(refused, str):
+        if not isinstance(refused, str) or not refused.strip():
             raise TypeError(f"refused is {refused!r}, not a reason")
         raise NoGraspFound(refused)
     unknown = sorted(set(values) - {"grasp", "refused", *_FIELDS})

@@ -13,7 +13,6 @@ from tasks.scene.frames import sapien_camera_pose
 
 NEAR, FAR = 0.2, 4.0
 """Distances between which the camera sees, m."""
-"""Distances between which the camera sees, m."""
 
 
 def camera_config(overhead: Overhead, centre_xy: tuple[float, float]) -> CameraConfig:

@@ -21,3 +21,9 @@ def test_a_mixture_is_trained_by_its_likelihood_and_has_variances():
         PatchNetworkConfig(mixture=3, variance=False)
     with pytest.raises(ValueError, match="mixture needs patches that are rotated"):
         PatchNetworkConfig(mixture=3, image="object")
+
+
+@pytest.mark.parametrize("bounds", [(0.9, 0.1), (-0.1, 0.5), (0.5, 1.1)])
+def test_a_success_range_is_of_shares_from_low_to_high(bounds):
+    with pytest.raises(ValueError, match="must be shares from low to high"):
+        LearningConfig(success_range=bounds)

@@ -88,6 +88,13 @@ def test_conditions_other_than_those_of_the_labels_are_named():
         "friction_pad_part 0.2, not 0.3 to 0.8",
         "friction_table_part 0.6, not 0.4",
     ]
+    coarse = Physics(rate_hz=250, position_iterations=4, persistent_manifold=True, skip_air=False)
+    assert other_conditions(source, coarse, None) == [
+        "rate_hz 250, not 1000",
+        "coarse_rate_hz 250, not 500",
+        "position_iterations 4, not 50",
+        "persistent_manifold 1, not 0",
+    ]
     assert source_text(source) == (
         "simulation version 4, fidelity cpu, camera 0.80 m over the table, errors of the cell: "
         "arm_position_std 0.001; friction_pad_part 0.3 to 0.8"

@@ -15,7 +15,7 @@ from mskgrasp.core.geometry import wrap_half_turn
 from mskgrasp.core.shipped import PRETRAINED, config_file
 from mskgrasp.parts import Part, find_part
 from mskgrasp.perception.part_pose import KnownPart
-from mskgrasp.planning.certified import rest_frame, to_base
+from mskgrasp.planning.certified import radius_about_vertical, rest_frame, to_base
 from mskgrasp.planning.certified_planner import (
     SIMULATED_ALIKE,
     CertifiedPlanner,
@@ -166,6 +166,9 @@ def test_grasps_too_near_to_the_table_for_the_cell_are_left_out_and_the_remedy_i
         plan.certified
         and plan.score > CertifiedPlanner(planner, PART, both).plan(frame, np.random.default_rng(0)).score
     )
+    variances = np.diag(plan.displacement_cov)
+    radius = radius_about_vertical(PART, resting)
+    assert plan.score >= 0.999 * (variances[:3].sum() + radius**2 * variances[3])
     assert not capsys.readouterr().err
     plan = CertifiedPlanner(cautious, PART, known).plan(frame, np.random.default_rng(0))
     assert not plan.certified
