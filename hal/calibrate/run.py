@@ -1,4 +1,4 @@
-"""Program: hand-eye calibration of a camera. Run ``python -m hal.calibrate --help``."""
+"""Run of a hand-eye calibration: pictures of the board, solution, report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Program: diagnosis of a cell. Run ``python -m hal.doctor --help``."""
+"""Run of the doctor: checks of a cell in order, and what they found."""
 
 from __future__ import annotations
 

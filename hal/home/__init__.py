@@ -1,1 +1,1 @@
-"""Program: homing of a cell's hand."""
+"""Program: home a cell's hand. Run ``python -m hal.home --help``."""

@@ -1,4 +1,4 @@
-"""Program: homing of a cell's hand. Run ``python -m hal.home --help``."""
+"""Homing of a cell's hand."""
 
 from __future__ import annotations
 

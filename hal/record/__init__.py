@@ -1,1 +1,1 @@
-"""Program: recording of a cell. Run ``python -m hal.record --help``."""
+"""Program: record a cell. Run ``python -m hal.record --help``."""

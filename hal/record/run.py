@@ -1,4 +1,4 @@
-"""Program: recording of a cell. Run ``python -m hal.record --help``."""
+"""Recording of a cell: frames of its camera, or a whole run."""
 
 from __future__ import annotations
 

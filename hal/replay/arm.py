@@ -166,7 +166,7 @@ class ReplayArm(SharingDevice, Arm):
         self._playback.same_question("check_pose", {"T_base_tcp": plain(T_base_tcp)})
 
     def legs(self, T_base_tcp: Pose) -> list[Pose]:
-        """A recording does not tell.
+        """Not recorded.
 
         Raises:
             NotRecorded: Always.
@@ -174,7 +174,7 @@ class ReplayArm(SharingDevice, Arm):
         raise NotRecorded("recordings do not hold by which motions the arm goes; ask the cell itself")
 
     def check_joints(self, joints: np.ndarray) -> None:
-        """A recording does not tell.
+        """Not recorded.
 
         Raises:
             NotRecorded: Always.

@@ -1,4 +1,4 @@
-"""Watch that tells parts at rest on the table from moving ones, by their motion between looks 20 ms apart."""
+"""Detector of parts at rest on the table, from their motion between samples 20 ms apart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mani_skill.utils.structs.actor import Actor
 from sapien.physx import PhysxRigidDynamicComponent
 
 STILL_SPEED, STILL_TURN = 0.002, 0.05
-"""Mean speeds of a quiet part between two looks, m/s and rad/s."""
+"""Mean speeds of a quiet part between two samples, m/s and rad/s."""
 QUIET_S = 0.08
 """Time for which a part that has moved, or leaned on the hand, must be quiet to be at rest, s: one that
 begins to topple, or turns back as it rocks, is not for so long."""

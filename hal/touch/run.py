@@ -1,4 +1,4 @@
-"""Program: measurement of a cell's table by touch. Run ``python -m hal.touch --help``."""
+"""Run of a measurement of the table: touches, plane, report."""
 
 from __future__ import annotations
 

@@ -42,6 +42,10 @@ from mskgrasp.trials.placed_trial import PlacedTrial
 TOLERANCE = f"{1e3 * DISTANCE:g} mm and {np.degrees(ANGLE):g} degrees"
 
 
+_STAGES = ("pose estimation", "closing", "transport", "release", "total")
+"""Names of `STAGES` in tables."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
     """What a report says of its run.
@@ -262,13 +266,13 @@ def _budget_section(budget: Sequence[Budget]) -> Section:
     return Section(
         title="Error budget",
         text=[
-            "Medians over the placed attempts, corrected by the prediction. Seeing: the found pose, "
-            "or without CAD the centre of the part's box, less the true one; without CAD the seen centre is "
-            "what is meant to be at the target, so that this error is not part of the total. Seizing: the "
-            "displacement in the hand less the predicted one. Carrying: from the end of the lift to the "
-            "moment before the release, a touch of the table included. Releasing: the rest."
+            "Medians over the placed attempts, corrected by the prediction. Pose estimation: the "
+            "found pose, or without CAD the centre of the part's box, less the true one; without CAD the seen "
+            "centre is what is meant to be at the target, so that this error is not part of the total. "
+            "Closing: the displacement in the hand less the predicted one. Transport: from the end of the "
+            "lift to the moment before the release, a touch of the table included. Release: the rest."
         ],
-        tables=[Table(header=("planner", "placed", *STAGES), rows=[_budget_row(one) for one in budget])],
+        tables=[Table(header=("planner", "placed", *_STAGES), rows=[_budget_row(one) for one in budget])],
     )
 
 
@@ -276,7 +280,7 @@ def _part_budgets_section(budget: Sequence[Budget]) -> Section:
     rows = [(one.part, *_budget_row(one)) for one in sorted(budget, key=lambda one: one.part)]
     return Section(
         title="Error budget a part",
-        tables=[Table(header=("part", "planner", "placed", *STAGES), rows=rows)],
+        tables=[Table(header=("part", "planner", "placed", *_STAGES), rows=rows)],
         page_only=True,
     )
 

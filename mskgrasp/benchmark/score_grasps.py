@@ -1,4 +1,4 @@
-"""Scores of anybody's grasps: predicted quality and displacement of the grasps of an isaac_grasp file."""
+"""Predicted quality and displacement of the grasps of an isaac_grasp file."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""First grasp: plan, grasp and film an example part in the simulated cell."""
+"""Program: plan, grasp and film an example part. Run ``python -m mskgrasp.demo --help``."""

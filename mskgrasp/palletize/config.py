@@ -25,7 +25,7 @@ class PalletizeConfig(Config):
     """Folder for trials.jsonl, report.html and the pictures."""
     parts: tuple[str, ...] = ("test",)
     """Names or folders of parts, or sets: test and validation (held out), train, new_sizes, starter,
-    catalogue; so many of a set: test:20; a .txt file of names."""
+    catalogue; N parts of a set, as in test:20; a .txt file of names."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen; 0: all."""
     trials: int = Field(default=3, ge=1, le=100_000)

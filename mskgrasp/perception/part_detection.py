@@ -110,7 +110,7 @@ def find_part_pixels(
         if abs(table_offset) > min_height:
             raise NoPartFound(
                 f"the table is seen {1e3 * table_offset:+z.1f} mm from table_z {table_z:g}, at most "
-                f"{min_height * 1e3:g} mm are forgiven: the camera's pose or table_z is wrong; calibrate "
+                f"{min_height * 1e3:g} mm are tolerated: the camera's pose or table_z is wrong; calibrate "
                 "again"
             )
         tops, heights = tops - table_offset, heights - table_offset

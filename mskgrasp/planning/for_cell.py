@@ -32,7 +32,7 @@ def make_planner(models: Path, config: PlannerConfig, cell: Cell) -> Planner:
 def tell_model(models: Models, cell: Cell) -> None:
     """Print the conditions of the labels that a model learned, and warn of those of a cell that differ."""
     if not models.meta.labels:
-        print("model: it does not tell under which conditions its labels were made")
+        print("model: the conditions of its labels are not stated")
     pose = cell.camera.T_base_camera
     height = None if pose is None else float(pose.position[2]) - cell.workspace.table_z
     for text in dict.fromkeys(map(source_text, models.meta.labels)):
@@ -49,7 +49,7 @@ def present(cell: Cell, part: str, seed: int) -> None:
         HalError: The cell has no feeder.
     """
     if cell.feeder is None:
-        raise HalError("this cell has no feeder; put the part there by hand and leave --part away")
+        raise HalError("this cell has no feeder; put the part there by hand and omit --part")
     cell.feeder.present(part, seed)
 
 

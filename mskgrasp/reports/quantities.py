@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 _UNKNOWN = 100.0
-"""An interval whose upper end is so many times the value, as of two parts, has none that tells anything."""
+"""An upper end of an interval of more than this many times the value, as of two parts, is shown as inf."""
 
 
 def millimetres(value: float | None, interval: Sequence[float] | None = None) -> str:

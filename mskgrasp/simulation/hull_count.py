@@ -6,5 +6,5 @@ Imported ones have up to 128."""
 
 
 def hull_excess(n_hulls: int) -> float:
-    """How many times as many pieces as a usual part's so many are, at least 1."""
+    """Number of pieces over `USUAL_HULLS`, at least 1."""
     return max(1.0, n_hulls / USUAL_HULLS)

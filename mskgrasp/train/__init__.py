@@ -1,4 +1,4 @@
-"""Program that trains the networks. Run ``python -m mskgrasp.train --help``, or call `run_training`."""
+"""Program: train the networks. Run ``python -m mskgrasp.train --help``, or call `run_training`."""
 
 from __future__ import annotations
 

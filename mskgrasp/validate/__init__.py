@@ -1,1 +1,1 @@
-"""Evidence that simulated labels are right: ``python -m mskgrasp.validate``."""
+"""Program: test simulated labels. Run ``python -m mskgrasp.validate --help``."""

@@ -81,7 +81,7 @@ def first_part(dataset: Dataset, part: Part | None) -> str | None:
     if part is None or part.name in dataset.part_names:
         return None if part is None else part.name
     raise UsageError(
-        f"{dataset.folder} has no attempts at part '{part.name}'; leave --part away, or take one of "
+        f"{dataset.folder} has no attempts at part '{part.name}'; omit --part, or take one of "
         f"{', '.join(dataset.part_names[:5])}, ..."
     )
 

@@ -1,4 +1,4 @@
-"""Trials of a stored run of mskgrasp.evaluate or mskgrasp.palletize, as far as both tell the same."""
+"""Trials of a stored run of mskgrasp.evaluate or mskgrasp.palletize: the fields that both have."""
 
 from __future__ import annotations
 

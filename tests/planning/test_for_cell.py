@@ -28,7 +28,7 @@ def test_a_planner_samples_over_the_cells_own_table():
 def test_a_model_tells_its_labels_and_warns_of_a_cell_unlike_theirs(capsys):
     models, cell = load_models(PRETRAINED), cell_from_yaml(SIMULATED_CELL)
     tell_model(replace(models, meta=models.meta.model_copy(update={"labels": ()})), cell)
-    assert "does not tell" in capsys.readouterr().out
+    assert "are not stated" in capsys.readouterr().out
     source = LabelSource(
         simulation="4", fidelity="cpu", physics=Physics().model_dump(), noise={}, hand={}, camera_height=0.8,
         seed=0,
@@ -49,7 +49,7 @@ def test_a_model_tells_its_labels_and_warns_of_a_cell_unlike_theirs(capsys):
 
 
 def test_a_part_cannot_be_presented_without_a_feeder():
-    with pytest.raises(HalError, match="no feeder; .* leave --part away"):
+    with pytest.raises(HalError, match="no feeder; .* omit --part"):
         present(replace(cell_from_yaml(SIMULATED_CELL), feeder=None), "hex_nut_m30", 0)
 
 
