@@ -55,8 +55,8 @@ class AssessConfig(Config):
     models: Path = PRETRAINED
     """Folder with model.safetensors and model.json; by default the shipped one."""
     simulations: int = Field(default=0, ge=0, le=1_000_000)
-    """Approximate number of simulations that certify a part's grasps, at least 24 for each kind of resting pose;
-    0: 1200, or 400 with --quick, and fewer of a part of more than 48 convex pieces."""
+    """Approximate number of simulations that certify a part's grasps, at least 24 for each kind of resting
+    pose; 0: 1200, or 400 with --quick, and fewer of a part of more than 48 convex pieces."""
     trials: int = Field(default=0, ge=0, le=100_000)
     """Trials of each policy with an exact camera; 0: 24, or 8 with --quick, and fewer of a part of more than
     48 convex pieces."""

@@ -267,8 +267,8 @@ def _budget_section(budget: Sequence[Budget]) -> Section:
         title="Error budget",
         text=[
             "Medians over the placed attempts, corrected by the prediction. Pose estimation: the "
-            "found pose, or without CAD the centre of the part's box, less the true one; without CAD the seen "
-            "centre is what is meant to be at the target, so that this error is not part of the total. "
+            "found pose, or without CAD the centre of the part's box, less the true one; without CAD the "
+            "seen centre is what is meant to be at the target, so that this error is not part of the total. "
             "Closing: the displacement in the hand less the predicted one. Transport: from the end of the "
             "lift to the moment before the release, a touch of the table included. Release: the rest."
         ],

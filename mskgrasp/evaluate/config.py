@@ -35,8 +35,8 @@ class EvaluateConfig(Config):
     """Folder for trials.jsonl, report.json and the pictures."""
     parts: tuple[str, ...] = ()
     """Names or folders of parts, or sets: train (the model's training parts), validation and test (held out),
-    new_sizes, starter, catalogue; N parts of a set, as in train:50; a .txt file of names. By default validation,
-    for displacement train and validation."""
+    new_sizes, starter, catalogue; N parts of a set, as in train:50; a .txt file of names. By default
+    validation, for displacement train and validation."""
     n_parts: int = Field(default=0, ge=0)
     """Greatest number of parts, evenly chosen, an equal share of every set; 0: all."""
     trials: int = Field(default=5, ge=1, le=100_000)
