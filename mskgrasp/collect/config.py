@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from pydantic import Field, model_validator
 
 from mskgrasp.core.config import Config
@@ -75,8 +73,8 @@ class CollectConfig(Config):
     """Grasps in a file; a killed run loses at most the files being made."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Seed of all random numbers; the data do not depend on the number of workers."""
-    workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
-    """Processes; 0: one per core."""
+    workers: int = Field(default=0, ge=0)
+    """Processes; 0: one for each core."""
     cluster: str | None = None
     """Run on a Ray cluster: auto, or host:port of its head. workers then bounds the cores that are used."""
     labels: tuple[Path, ...] = ()

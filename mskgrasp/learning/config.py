@@ -17,7 +17,9 @@ class StageConfig(Config):
     """Optimisation of one network."""
 
     optimiser: Literal["adam", "rmsprop"] = "adam"
+    """Rule of the steps (paper: rmsprop)."""
     learning_rate: float = Field(default=1e-3, gt=0.0)
+    """Greatest rate of the steps (paper: 1e-5)."""
     weight_decay: float = Field(default=0.0, ge=0.0)
     """With adam: each step takes learning_rate * weight_decay of a layer's weights away, not of its biases
     (AdamW: Loshchilov and Hutter 2019, arXiv 1711.05101)."""
@@ -26,9 +28,11 @@ class StageConfig(Config):
     schedule: Literal["constant", "cosine"] = "cosine"
     """cosine: the rate falls to zero at the end, after a linear rise over the first 5 % of the steps."""
     epochs: int = Field(default=15, ge=1)
+    """Greatest number of passes over the training data (paper: 100)."""
     patience: int | None = Field(default=None, ge=1)
     """Training ends after this many epochs without a lower validation loss; null: after all epochs."""
     batch_size: int = Field(default=32, ge=1)
+    """Samples of a step."""
     batch_norm: bool = False
     """The image branch trains with batch normalisation, which is folded into its weights at the end: the
     model has the same layers, and takes the same time (paper: no)."""
@@ -48,6 +52,7 @@ class LearningConfig(Config):
     """Settings of training; with the same data, device type and threads they give the same model."""
 
     seed: int = Field(default=0, ge=0, lt=2**63)
+    """Determines first weights, order of the samples, noise and dropout."""
     sides: Literal["name", "catalogue"] = "name"
     """Split of the parts: by a hash of their name, or as the catalogue says (validation and test are whole
     families, `new_sizes` other sizes of families that are trained on)."""
@@ -58,6 +63,7 @@ class LearningConfig(Config):
     success_range: tuple[float, float] = (0.0, 1.0)
     """Parts whose success rate of random grasps lies outside are excluded (paper: 0.05 to 0.40)."""
     network: NetworkConfig = PatchNetworkConfig()
+    """Architecture of both networks."""
     noise_std: float = Field(default=0.003, ge=0.0)
     """Noise on each pixel of a training patch, metres."""
     symmetric: bool = True
@@ -70,7 +76,9 @@ class LearningConfig(Config):
     keep_best: bool = True
     """Keep the epoch of lowest validation loss instead of the last."""
     gqn: StageConfig = StageConfig()
+    """Training of the quality network."""
     gdn: StageConfig = StageConfig()
+    """Training of the displacement network."""
 
     @model_validator(mode="after")
     def _check(self) -> LearningConfig:

@@ -19,9 +19,13 @@ class _NetworkConfig(Config):
     patch_side: float = Field(default=0.128, gt=0.0, le=1.0)
     """Length along the closing direction, metres."""
     trunk_width: int = Field(default=1024, ge=1, le=8192)
+    """Features of the image after its layers."""
     action_width: int = Field(default=64, ge=1, le=8192)
+    """Features of the part's centre relative to the grasp."""
     head_width: int = Field(default=512, ge=1, le=8192)
+    """Features in the layer before the outputs."""
     dropout: float = Field(default=0.5, ge=0.0, lt=1.0)
+    """Share of the features that training leaves out at random."""
     variance: bool = True
     """False: the displacement network predicts the mean alone (the paper's GCIP-M)."""
     symmetric_views: bool = False
@@ -69,12 +73,14 @@ class PatchNetworkConfig(_NetworkConfig):
     """
 
     architecture: Literal["patch"] = "patch"
+    """The paper's."""
     image: Literal["grasp", "object"] = "grasp"
     """Input of the displacement network: the patch around the grasp (the paper's GCIP), or one around the
     part, not rotated, with the grasp's angle (OCFI). The quality network always sees the grasp's."""
     patch_pixels: int = Field(default=64, ge=32, le=256)
     """Pixels along either side."""
     channels: int = Field(default=32, ge=1, le=512)
+    """Channels of each of the four convolutions."""
     quality_stride: ClassVar[int] = 1
 
     @model_validator(mode="after")
@@ -112,6 +118,7 @@ class HandNetworkConfig(_NetworkConfig):
     """Architecture that compares the heights around a grasp with those of the hand's parts."""
 
     architecture: Literal["hand"] = "hand"
+    """Ours."""
     sees_object: ClassVar[bool] = False
     patch_pixels: int = Field(default=64, ge=16, le=256)
     """Pixels along the closing direction."""

@@ -16,6 +16,7 @@ class PlannerConfig(Config):
     """Settings of search and selection; as in the paper but for ``sure_quality`` and ``recentre``."""
 
     n_candidates: int = Field(default=3200, ge=1, le=1_000_000)
+    """Number of grasps that are sampled over the part."""
     top_fraction: float = Field(default=0.03, gt=0.0, le=1.0)
     """Share of the candidates, best quality first, among which the variance score selects."""
     policy: Literal["low_variance", "quality", "certified"] = "low_variance"

@@ -21,6 +21,7 @@ class TrainConfig(LearningConfig):
 
     # The file chooses the architecture; options set its fields.
     network: Annotated[NetworkConfig, tyro.conf.AvoidSubcommands] = PatchNetworkConfig()
+    """Architecture of both networks."""
     data: Path | None = None
     """The dataset folder."""
     planned: tuple[Path, ...] = ()

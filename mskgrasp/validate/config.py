@@ -113,7 +113,7 @@ class ValidateConfig(Config):
     """Grasps of each part that are tried under each variant."""
     seed: int = Field(default=0, ge=0, lt=2**63)
     """Determines the starts and grasps."""
-    workers: Annotated[int, tyro.conf.arg(help="Processes; 0: one for each core.")] = Field(default=0, ge=0)
+    workers: int = Field(default=0, ge=0)
     """Processes; 0: one for each core."""
     references: Annotated[tuple[Reference, ...], tyro.conf.Suppress] = (
         Reference(rate_hz=2000, position_iterations=100, grasps_per_part=20, floor_grasps_per_part=8),

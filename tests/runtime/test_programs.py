@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
+import inspect
+import itertools
 import json
 import subprocess
 import sys
+import textwrap
 from importlib.util import find_spec
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 
 from mskgrasp.runtime.programs import GROUPS, PROGRAMS, guide
 
@@ -52,3 +59,41 @@ def test_options_load_neither_networks_nor_meshes_nor_a_simulator():
     loaded = set(json.loads(done.stdout))
     assert len(configs) > 10 and loaded >= set(configs)
     assert not loaded & {"matplotlib", "mani_skill", "mujoco", "sapien", "torch", "trimesh"}
+
+
+@pytest.mark.parametrize("name", [name for name, one in PROGRAMS.items() if ".config:" in one.options])
+def test_every_option_says_what_it_sets(name: str):
+    module, _, config = PROGRAMS[name].options.partition(":")
+    unsaid = [
+        f"{one.__name__}.{field}"
+        for one in sorted(settings_in(getattr(importlib.import_module(module), config)), key=str)
+        for field in set(one.__annotations__) - documented(one)
+        if field in one.model_fields
+    ]
+    assert not unsaid
+
+
+def settings_in(config: type[BaseModel]) -> set[type[BaseModel]]:
+    """A class of settings, its bases, and those of its fields."""
+    found = {
+        one for one in config.__mro__ if issubclass(one, BaseModel) and one.__module__ != "pydantic.main"
+    }
+    for field in config.model_fields.values():
+        for one in (field.annotation, *get_args(field.annotation)):
+            if isinstance(one, type) and issubclass(one, BaseModel):
+                found |= settings_in(one)
+    return found
+
+
+def documented(config: type[BaseModel]) -> set[str]:
+    """Fields of a class that are followed by a docstring."""
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(config))).body
+    assert isinstance(tree, ast.ClassDef)
+    return {
+        node.target.id
+        for node, after in itertools.pairwise(tree.body)
+        if isinstance(node, ast.AnnAssign)
+        and isinstance(node.target, ast.Name)
+        and isinstance(after, ast.Expr)
+        and isinstance(after.value, ast.Constant)
+    }

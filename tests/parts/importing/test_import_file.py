@@ -10,7 +10,6 @@ from build123d import Box, Cylinder, export_step
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts import find_part
 from mskgrasp.parts.importing.import_file import import_file, import_part
-from mskgrasp.parts.names import legal_name
 
 
 def bracket() -> trimesh.Trimesh:
@@ -255,23 +254,3 @@ def test_a_part_of_a_metre_and_one_in_the_wrong_unit_are_refused(tmp_path, edge,
     with pytest.raises(BadPart) as caught:
         import_part(tmp_path / "bar.stl")
     assert said in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [
-        ("Größe 3", "groesse-3"),
-        ("../../etc/passwd", "etc-passwd"),
-        ("M8_Nut-v2", "m8_nut-v2"),
-        ("Écrou", "ecrou"),
-        ("a" * 300, "a" * 80),
-    ],
-)
-def test_names_are_made_legal_and_never_leave_the_folder(text, name):
-    assert legal_name(text) == name
-
-
-@pytest.mark.parametrize("text", ["", "...", "部品", "--"])
-def test_a_name_of_which_nothing_is_left_is_refused(text):
-    with pytest.raises(BadPart, match="--name"):
-        legal_name(text)
