@@ -6,13 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-HAND_MASS = 0.73
-"""Mass of the Franka Hand with its fingers, kg (Desk's entry "Franka Hand")."""
-HAND_CENTRE = (-0.01, 0.0, 0.03)
-"""Its centre of mass in the flange, metres (the same)."""
-PAYLOAD = 3.0
-"""Greatest payload of a Panda or FR3, hand included, kg (data sheets)."""
-
 
 def holds(width: float, grasped: bool | None, closed_width: float) -> bool:
     """Whether the fingers hold something: one rule, for the moment of closing and after the lift.

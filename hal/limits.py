@@ -9,10 +9,10 @@ import numpy as np
 
 from hal.errors import OutOfWorkspace
 from hal.gripper import FRANKA_HAND, GripperSpec
-from hal.hand import HAND_MASS, PAYLOAD
 from hal.keep_out import KeepOut
 from mskgrasp.core.geometry import Pose, pose_distance, quat_rotate, straight_line
 from mskgrasp.core.grasp import MIN_GAP, TABLE_CLEARANCE
+from mskgrasp.core.panda_body import HAND_MASS, PAYLOAD
 
 _STEP = 0.01
 """Greatest distance between two checked points of a straight motion, metres."""

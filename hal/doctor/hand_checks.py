@@ -11,8 +11,8 @@ import numpy as np
 from hal.arm import WIDTH_TOLERANCE, Arm
 from hal.cell import Workspace
 from hal.doctor.checks import Finding
-from hal.hand import HAND_CENTRE, HAND_MASS
 from mskgrasp.core.grasp import MAX_OPENING
+from mskgrasp.core.panda_body import HAND_CENTRE, HAND_MASS
 
 _HAND_MASS_OK, _HAND_CENTRE_OK = 0.1, 0.02
 """Other fingers may change the hand's mass, kg, and centre of mass, metres, by this much."""

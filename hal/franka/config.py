@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from hal.gripper import FRANKA_HAND
-from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.core.config import Config
+from mskgrasp.core.panda_body import HAND_MASS, PAYLOAD
 from mskgrasp.core.panda_kinematics import JOINT_LOWER, JOINT_UPPER
 
 Seven = tuple[float, float, float, float, float, float, float]

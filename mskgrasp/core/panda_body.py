@@ -1,4 +1,4 @@
-"""Outline of the Panda with the Franka Hand as capsules, for collision checks."""
+"""Masses of the Panda's hand, and the outline of arm and hand as capsules, for collision checks."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ import numpy as np
 
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.panda_kinematics import DH_A, DH_D, FLANGE_OFFSET, TCP_OFFSET, joint_frames, solve, track
+
+HAND_MASS = 0.73
+"""Mass of the Franka Hand with its fingers, kg (Desk's entry "Franka Hand")."""
+HAND_CENTRE = (-0.01, 0.0, 0.03)
+"""Its centre of mass in the flange, metres (the same)."""
+PAYLOAD = 3.0
+"""Greatest payload of a Panda or FR3, hand included, kg (data sheets)."""
 
 
 @dataclass(frozen=True, kw_only=True)

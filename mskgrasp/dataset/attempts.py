@@ -11,6 +11,7 @@ import numpy as np
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES
+from mskgrasp.core.settings import Physics
 
 DEPTH_UNIT = 1e-4
 """Resolution of a stored depth, metres."""
@@ -221,3 +222,12 @@ def problems(attempts: Attempts) -> Iterator[str]:
         bad = np.flatnonzero(rows & (np.abs(length - 1) > 1e-3))
         if len(bad):
             yield f"{name} of attempt {bad[0]} has a quaternion of length {length[bad[0]]:.3g}, must be 1"
+
+
+def physics_of(info: ShardInfo) -> dict[str, Any]:
+    """Get those settings of a shard that the task has; settings of older versions would be refused.
+
+    A shard without a coarse rate was simulated at the full rate throughout.
+    """
+    known = {name: value for name, value in info.physics.items() if name in Physics.model_fields}
+    return dict(coarse_rate_hz=info.physics.get("rate_hz")) | known

@@ -14,7 +14,7 @@ from mskgrasp.core.grasp import FAILURES
 from mskgrasp.core.seeds import scene_seeds
 from mskgrasp.core.settings import ExecutionNoise, Overhead, Physics
 from mskgrasp.dataset import ShardInfo
-from mskgrasp.dataset.commands.maniskill import physics_of
+from mskgrasp.dataset.attempts import physics_of
 from mskgrasp.parts import Part
 from mskgrasp.simulation.shard import Simulator, lies_as
 from mskgrasp.view.motion import Motion

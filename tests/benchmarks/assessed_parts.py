@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.assess.config import AssessConfig, parse_tolerance
 from mskgrasp.assess.run import assess, begin_trials
 from mskgrasp.assess.summary import DISTANCES, Row, summarise
@@ -22,6 +21,7 @@ from mskgrasp.assess.trials import CONDITIONS, EXACT, PLANNERS, AssessSetup, tri
 from mskgrasp.core.errors import BadPart
 from mskgrasp.core.grasp import MAX_OPENING, TILT_LIMIT
 from mskgrasp.core.metrics import rms_interval, share_interval
+from mskgrasp.core.panda_body import HAND_MASS, PAYLOAD
 from mskgrasp.core.shipped import PRETRAINED
 from mskgrasp.evaluate.summary import displacement_errors
 from mskgrasp.learning.grasp_models import load_models

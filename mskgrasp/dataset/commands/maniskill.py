@@ -11,8 +11,7 @@ import numpy as np
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import FAILURES, pose_base_tcp
-from mskgrasp.core.settings import Physics
-from mskgrasp.dataset.attempts import Attempts, ShardInfo, u16_to_depth
+from mskgrasp.dataset.attempts import Attempts, ShardInfo, physics_of, u16_to_depth
 from mskgrasp.dataset.export import Watch, check_export_path, renamed_at_the_end, same_settings
 from mskgrasp.dataset.shards import list_shards, read_columns, read_shard
 
@@ -95,15 +94,6 @@ def _pose_after(attempts: Attempts, lift_height: float) -> np.ndarray:
     lifted[:, 2] += lift_height
     after = pose_base_tcp(lifted) @ Pose.from_vector(attempts.pose_tcp_obj_after.astype(np.float64))
     return np.where(attempts.success[:, None], after.as_vector(), np.nan)
-
-
-def physics_of(info: ShardInfo) -> dict[str, Any]:
-    """Get those settings of a shard that the task has; settings of older versions would be refused.
-
-    A shard without a coarse rate was simulated at the full rate throughout.
-    """
-    known = {name: value for name, value in info.physics.items() if name in Physics.model_fields}
-    return dict(coarse_rate_hz=info.physics.get("rate_hz")) | known
 
 
 def _outcome(attempts: Attempts, info: ShardInfo, row: int) -> dict[str, Any]:

@@ -13,8 +13,8 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
-from hal.hand import HAND_MASS, PAYLOAD
 from mskgrasp.core.errors import BadPart, UsageError
+from mskgrasp.core.panda_body import HAND_MASS, PAYLOAD
 from mskgrasp.parts import store
 from mskgrasp.parts.commands.grade import coarse_note
 from mskgrasp.parts.commands.import_files import FileResult, ImportOptions, import_files
