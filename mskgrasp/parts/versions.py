@@ -13,7 +13,7 @@ from pathlib import Path
 PART_VERSION = 2
 """Building a part from a solid: pieces, decomposition, measurements, stable poses, files."""
 
-IMPORT_VERSION = 3
+IMPORT_VERSION = 4
 """Reading, repairing and simplifying an imported mesh, and its convex pieces."""
 
 _FIRST = Path(__file__).parent / "first_versions.json"

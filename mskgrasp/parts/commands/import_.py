@@ -170,6 +170,7 @@ def _without(message: str, path: Path) -> str:
 def _warnings(part: Part, imported: Imported) -> list[str]:
     from mskgrasp.core.units import MILLIMETRES
     from mskgrasp.parts.importing.mesh_files import USUAL_SIZE_MM, size_hint
+    from mskgrasp.parts.solids.mesh_pieces import MOST_OPENING_MM
 
     found = []
     longest = 1e3 * part.longest_axis
@@ -180,6 +181,12 @@ def _warnings(part: Part, imported: Imported) -> list[str]:
         found.append(
             f"{part.name} is {longest:.4g} mm long; the usual size is "
             f"{USUAL_SIZE_MM[0]:.0f} to {USUAL_SIZE_MM[1]:.0f} mm: is the unit right?{hint}"
+        )
+    beyond = 1e3 * store.read_record(part.folder)["hull_outward"]["largest"]
+    if beyond > MOST_OPENING_MM + 1:  # pieces overlap by 1 mm
+        found.append(
+            f"the hulls of {part.name} reach up to {beyond:.1f} mm from its surface where it is open: in "
+            "simulation no finger can enter there"
         )
     carried = PAYLOAD - HAND_MASS
     if part.mass > carried:

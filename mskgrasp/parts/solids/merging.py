@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from manifold3d import Manifold
@@ -15,6 +15,8 @@ _TOUCH_MM = 1e-3
 """Pieces whose boxes are farther apart do not touch."""
 _ROUNDING = 1e-6
 """Share by which two computations of a volume may differ."""
+_MUCH_MM3 = 5.0
+"""Volume that a union must add before it is asked whether it may: less fills no opening."""
 
 Boxes = dict[int, tuple[np.ndarray, np.ndarray]]
 """Lowest and highest corner (3,) of the box around each piece, by its number."""
@@ -30,8 +32,18 @@ def merge_hulls(hulls: Sequence[np.ndarray], slack: float = 0.002) -> list[np.nd
     return merge_in_steps(hulls, (slack,))[0]
 
 
-def merge_in_steps(hulls: Sequence[np.ndarray], slacks: Sequence[float]) -> list[list[np.ndarray]]:
-    """The results of `merge_hulls` with several slacks, in increasing order, for the time of the last."""
+def merge_in_steps(
+    hulls: Sequence[np.ndarray],
+    slacks: Sequence[float],
+    allowed: Callable[[np.ndarray], bool] = lambda joined: True,
+) -> list[list[np.ndarray]]:
+    """The results of `merge_hulls` with several slacks, in increasing order, for the time of the last.
+
+    Args:
+        hulls: As in `merge_hulls`.
+        slacks: As its slack.
+        allowed: Whether a union (n, 3) that adds much may be made.
+    """
     pieces = {number: np.asarray(points, dtype=float) for number, points in enumerate(hulls)}
     volumes = {number: ConvexHull(points).volume for number, points in pieces.items()}
     boxes = {number: (points.min(axis=0), points.max(axis=0)) for number, points in pieces.items()}
@@ -77,6 +89,8 @@ def merge_in_steps(hulls: Sequence[np.ndarray], slacks: Sequence[float]) -> list
             break
         if (a, b) in bounded:
             measure(a, b)
+            continue
+        if added > _MUCH_MM3 and not allowed(joints[a, b][0]):
             continue
         budgets = [budget - max(added, 0.0) for budget in budgets]
         pieces[fresh], volumes[fresh] = joints[a, b]

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 import trimesh
-from manifold3d import Manifold, OpType
+from manifold3d import Manifold, Mesh64, OpType
 
 from mskgrasp.core.errors import BadPart
 from mskgrasp.parts.solids.decompose import (
@@ -56,6 +56,9 @@ _BOUNDS = ((CLOSE_P95_MM, CLOSE_VOLUME_RATIO), (MOST_P95_MM - 0.05, MOST_VOLUME_
 
 It is closer than a fine part's, which is measured again on the mesh itself and with pieces that overlap.
 """
+MOST_OPENING_MM = 3.0
+"""Greatest distance from the mesh to what its pieces fill, beside the holes that layers fill: no finger fits
+into what is narrower, and a wider opening stays open."""
 _SLACKS = (0.005, 0.015, 0.03, 0.05, 0.08)
 _COARSE_SLACKS = (0.03, 0.08, 0.15, 0.3, 0.5)
 """Shares of the volume that joining may add."""
@@ -101,6 +104,9 @@ class _Search:
     def __init__(self, mesh_mm: trimesh.Trimesh) -> None:
         self._mesh = mesh_mm
         self._surface = MeshSurface(mesh_mm)
+        self._solid = Manifold(
+            Mesh64(np.array(mesh_mm.vertices, np.float64), np.array(mesh_mm.faces, np.uint64))
+        )
         self._turned = [TurnedMesh(mesh_mm, direction) for direction in layer_directions(mesh_mm)]
 
     def fine(self, tolerances: Tolerances) -> list[np.ndarray] | None:
@@ -130,7 +136,8 @@ class _Search:
         thin = False
         for tolerances in (_WIDEST, *COARSE):
             for pieces in self._sets(tolerances):
-                steps = (split_slender(step, _MOST_SPLIT) for step in merge_in_steps(pieces, _COARSE_SLACKS))
+                merged = merge_in_steps(pieces, _COARSE_SLACKS, self._stays_open)
+                steps = (split_slender(step, _MOST_SPLIT) for step in merged)
                 few = next((step for step in steps if len(step) <= MOST_MESH_HULLS), None)
                 if few is not None and _is_whole(few, self._mesh.volume):
                     found.append((_excess(self._surface.fit(few)), few))
@@ -158,7 +165,8 @@ class _Search:
 
     def _joined(self, pieces: Sequence[np.ndarray]) -> list[np.ndarray] | None:
         """Pieces joined to few, as far as the bounds allow; None where too many are left."""
-        steps = [split_slender(step, _MOST_SPLIT) for step in (pieces, *merge_in_steps(pieces, _SLACKS))]
+        merged = merge_in_steps(pieces, _SLACKS, self._stays_open)
+        steps = [split_slender(step, _MOST_SPLIT) for step in (pieces, *merged)]
         if len(steps[-1]) > MOST_MESH_HULLS:
             return None
         largest_first = steps[::-1]
@@ -173,7 +181,16 @@ class _Search:
         return joined if len(joined) <= MOST_MESH_HULLS else None
 
     def _within(self, bounds: tuple[float, float], pieces: Sequence[np.ndarray]) -> bool:
-        return bool(pieces) and self._surface.fit_within(pieces, *bounds) is not None
+        return bool(pieces) and self._surface.fit_within(pieces, *bounds, MOST_OPENING_MM) is not None
+
+    def _stays_open(self, points: np.ndarray) -> bool:
+        """Whether a convex body fills no opening of the mesh wider than `MOST_OPENING_MM` either way."""
+        filled = Manifold.hull_points(np.asarray(points, dtype=np.float64)) - self._solid
+        if filled.is_empty():
+            return True
+        data = filled.refine_to_length(MOST_OPENING_MM / 2).to_mesh64()
+        triangles = np.asarray(data.vert_properties)[:, :3][np.asarray(data.tri_verts)]
+        return bool(self._surface.surface.distance_to(triangles.mean(axis=1)).max() <= MOST_OPENING_MM)
 
 
 _TOO_THIN = "it is too thin to be cut into pieces of at least 0.2 mm: make it thicker"

@@ -17,7 +17,7 @@ from mskgrasp.parts.solids import mesh_pieces as mesh_pieces_module
 from mskgrasp.parts.solids import solid as s
 from mskgrasp.parts.solids.layers import Tolerances
 from mskgrasp.parts.solids.measure import MOST_ASPECT_RATIO, MOST_P95_MM, aspect_ratio, hull_fit
-from mskgrasp.parts.solids.mesh_pieces import MOST_MESH_HULLS, mesh_pieces
+from mskgrasp.parts.solids.mesh_pieces import MOST_MESH_HULLS, MOST_OPENING_MM, mesh_pieces
 from tests.parts.solids.test_decompose import mesh_of
 
 DIGEST = """
@@ -52,6 +52,32 @@ def test_a_grille_that_few_pieces_of_coacd_do_not_represent_is_close_and_open():
     assert fit.p95 < MOST_P95_MM and 1 / 1.1 < fit.volume_ratio < 1.1
     for points in pieces:
         assert not trimesh.convex.convex_hull(points).contains([[7, 6, 3], [19, 15.5, 3]]).any()
+
+
+def plate(x: float, y: float, z: float, opening: Manifold) -> trimesh.Trimesh:
+    return mesh_of(s.extrude(s.rectangle(0, x, 0, y), 0, z) - opening)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        plate(145, 125, 12, s.extrude(s.rectangle(56, 88, 50, 76), -1, 13)),  # 5 % of its volume
+        plate(120, 90, 20, s.extrude(s.rectangle(45, 75, 33, 57), 8, 21)),
+        plate(120, 80, 6, s.extrude(s.polygon(15, 40) + [60, 40], -1, 7)),
+    ],
+    ids=["window", "pocket", "bore"],
+)
+def test_an_opening_that_a_finger_enters_stays_open(mesh):
+    pieces = mesh_pieces(mesh)
+    check(mesh, pieces)
+    middle = [*mesh.bounds.mean(axis=0)[:2], mesh.bounds[1, 2] - 1]
+    assert not any(trimesh.convex.convex_hull(points).contains([middle])[0] for points in pieces)
+    assert hull_fit(mesh, pieces).outward_largest <= MOST_OPENING_MM
+
+
+def test_a_hole_that_no_finger_enters_is_filled():
+    mesh = plate(60, 40, 8, s.extrude(s.polygon(2.5, 24) + [30, 20], -1, 9))
+    assert len(mesh_pieces(mesh)) == 1
 
 
 def test_a_thin_shell_keeps_its_inside_open():
