@@ -24,7 +24,7 @@ from hal.limits import (
 )
 from hal.motion_gate import MotionGate
 from mskgrasp.core.geometry import Pose, pose_distance
-from mskgrasp.core.panda_body import Links
+from mskgrasp.core.panda_body import HAND_MASS, PAYLOAD, Links
 
 JOINT_TOLERANCE = 5e-3
 """Greatest error of each joint at the end of a joint motion, radians."""
@@ -378,9 +378,15 @@ class Arm(Device):
             LoadTooHeavy: Names both masses and the remedy.
         """
         if not mass <= self.limits.max_load:
+            carried = PAYLOAD - HAND_MASS
+            remedy = (
+                "leave it out, or on a real cell raise arm.contact_force and arm.contact_torque "
+                "(docs/real_cell.md)"
+                if mass <= carried
+                else f"the robot carries {carried:.3f} kg beside its hand; is the part's density right?"
+            )
             raise LoadTooHeavy(
-                f"the part weighs {mass:.3f} kg, this arm carries {self.limits.max_load:.3f} kg: leave it "
-                "out, or on a real cell raise arm.contact_force and arm.contact_torque (docs/real_cell.md)"
+                f"the part weighs {mass:.3f} kg, this arm carries {self.limits.max_load:.3f} kg: {remedy}"
             )
 
     def _check_pose(self, limits: ArmLimits, T_base_tcp: Pose) -> None:

@@ -311,7 +311,9 @@ def check_stream(camera: Camera, frames: list[RgbdFrame]) -> Iterator[Finding]:
         )
     elif rate < _GOOD_RATE or age_s > _MAX_AGE_S:
         yield Finding(
-            level="warn", subject="camera stream", text=f"{said}: slow; plug it into a USB 3 port of its own"
+            level="warn",
+            subject="camera stream",
+            text=f"{said}: slow; plug a real camera into a USB 3 port of its own",
         )
     else:
         yield Finding(level="ok", subject="camera stream", text=said)

@@ -11,7 +11,7 @@ from mskgrasp.core.config import Config
 from mskgrasp.core.errors import BadDataset
 from mskgrasp.dataset import ShardInfo
 
-SAME_HEIGHT = 0.05
+SAME_HEIGHT = 0.05 + 1e-9
 """Camera heights that differ by less are the same, metres: perspective changes by a twentieth."""
 
 

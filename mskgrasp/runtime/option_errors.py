@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import tyro
@@ -57,6 +58,8 @@ def _explain(event: _errors.ParseErrorEvent, arguments: Sequence[str], legal: Se
             if name in legal:  # with another choice among alternatives
                 return f"{name} belongs to settings that are not chosen; choose them in the --config file"
             similar = difflib.get_close_matches(name, legal)
+            if not similar and Path(first).exists():
+                return f"unknown option {first}; of a file write ./{first}"
             return f"unknown option {first}" + (f"; similar: {', '.join(similar)}" if similar else "")
         case _errors.UnrecognizedArgs(tokens=[first, *_]):
             return f"unexpected argument {first!r}"

@@ -90,7 +90,10 @@ class PlannerProcess:
         assert self._connection is not None
         try:
             if not self._connection.poll(START_S):
-                raise MskgraspError(f"a worker did not start within {START_S:g} s; start fewer: --workers 1")
+                raise MskgraspError(
+                    f"a worker did not start within {START_S:g} s: the machine is busy or short of memory; "
+                    "start fewer (--workers), or free it"
+                )
             message = self._connection.recv_bytes()
         except (EOFError, OSError) as error:
             raise MskgraspError("a worker ended while it started; its errors are above") from error
