@@ -293,8 +293,6 @@ def main() -> int:
     for line in solve(config, folder, board, workspace):
         print(line)
     print(f"wrote calibration.yaml, corners.png and residuals.png in {config.folder}; look at both pictures,")
-    print(
-        "then, for a real cell, copy calibration.yaml to where camera.calibration of its file points; if the"
-    )
-    print("line 'depth' states a correction, add it to camera.depth_offset of that file")
+    print("then, for a real cell, copy calibration.yaml to where camera.calibration of its file points; if")
+    print("the line 'depth' states a correction, add it to camera.depth_offset of that file")
     return 0

@@ -125,10 +125,10 @@ def find_part_pixels(
     if mask is None and half < min_height:
         raised, mask, n_other = _raised_group(heights, near, half, noise)
         mask = None if _share(raised, near) > MOST_RAISED else mask
-    if mask is None and tops[near].max() > min_height:
+    if mask is None and noise <= QUIET and tops[near].max() > min_height:
         raise NoPartFound(
             f"what rises more than {min_height * 1e3:g} mm above the table in the region is of fewer than "
-            f"{MIN_PIXELS} pixels in one place: too small for this camera at its height, or noise"
+            f"{MIN_PIXELS} pixels in one place: too small for this camera at its height"
         )
     if mask is None:
         raise NoPartFound(

@@ -131,6 +131,7 @@ def test_a_real_hand_does_not_drop_what_it_holds(cell: Cell, arm: WritingArm):
     with pytest.raises(HandFull, match=r"put it down \(hal.put_down\), or take it and open") as caught:
         go_home(cell)
     assert arm.log == [] and "\n" not in str(caught.value)
+    assert str(caught.value).endswith("carries 2.270 kg beside its hand; is the part's density right?")
     arm.wait(0.1)  # a refusal is no fault
     arm.log.clear()
     asked: list[int] = []

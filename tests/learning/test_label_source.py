@@ -82,6 +82,7 @@ def test_conditions_other_than_those_of_the_labels_are_named():
     )  # fmt: skip
     assert other_conditions(source, Physics(friction_pad_part=0.7), 0.82) == []
     assert other_conditions(source, None, None) == []
+    assert other_conditions(source, None, 0.75) == other_conditions(source, None, 0.85) == []
     smooth = Physics(friction_pad_part=0.2, friction_table_part=0.6)
     assert other_conditions(source, smooth, 1.1) == [
         "camera 1.10 m over the table, not 0.80",

@@ -226,6 +226,12 @@ def test_a_wire_of_4_mm_is_seen_through_the_noise_of_a_kinect_where_that_is_what
     assert np.abs(errors).max() < 0.015  # an end may be missing
 
 
+def test_a_part_of_too_few_pixels_is_not_called_an_empty_table():
+    speck = Box(x=0.455, y=0.0, yaw=0.0, size=(0.004, 0.003, 0.004))
+    with pytest.raises(NoPartFound, match="rises more than 2 mm .* fewer than 5 pixels in one place"):
+        view_part(render([speck]), INTRINSICS, OVERHEAD, table_z=TABLE_Z, region=REGION)
+
+
 def test_a_flat_part_that_is_looked_for_shows_itself_in_an_exact_image():
     box = Box(x=0.455, y=0.0, yaw=0.2, size=(0.06, 0.03, 0.0016))
     with pytest.raises(NoPartFound, match="more than 2 mm"):
