@@ -12,6 +12,7 @@ from hal.camera import RgbdFrame
 from hal.cell import Cell
 from hal.errors import ArmInView, HandFull, MotionAborted, NotCalibrated, OutOfWorkspace, Stopped
 from hal.hand import Load
+from hal.sight import link_in_sight
 from mskgrasp.core.geometry import Pose
 from mskgrasp.core.grasp import HOLD_S, SAME_HAND, Grasp
 
@@ -295,13 +296,20 @@ def capture_at_home(cell: Cell, timeout_s: float = 5.0) -> RgbdFrame:
         timeout_s: As in `Camera.capture`.
 
     Raises:
-        ArmInView: The arm is not at home.
+        ArmInView: The arm is not at home, or stands in the camera's sight there.
         CaptureFailed: As in `Camera.capture`.
     """
-    off = np.abs(cell.arm.state().joints - cell.workspace.home)
+    joints = cell.arm.state().joints
+    off = np.abs(joints - cell.workspace.home)
     if off.max() > AT_HOME:
         raise ArmInView(
             f"joint {int(off.argmax()) + 1} is {off.max():.2f} rad from home: the arm may be in the camera's "
             "view; move it home first (hal.go_home, or python -m mskgrasp.plan --go-home)"
         )
-    return cell.camera.capture(timeout_s)
+    frame = cell.camera.capture(timeout_s)
+    if cell.arm.links is not None and (name := link_in_sight(cell.arm.links, joints, frame, cell.workspace)):
+        raise ArmInView(
+            f"at home the arm's {name} is in the camera's sight of the region: choose other joints for "
+            "workspace.home"
+        )
+    return frame

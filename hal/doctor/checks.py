@@ -20,6 +20,8 @@ from hal.cell import Workspace
 from hal.charuco import project
 from hal.devices import out_of_reach
 from hal.errors import HalError
+from hal.execute import AT_HOME
+from hal.sight import link_in_sight
 from hal.table import HIGHEST_TABLE, fit_table
 from mskgrasp.core.errors import BadConfig, MskgraspError
 from mskgrasp.core.geometry import Pose
@@ -342,6 +344,24 @@ def check_view(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:
         else f"the region, up to the {workspace.lift_height * 1e3:.0f} mm of a lift, reaches {-margin:.0f} "
         "pixels out of the image; move the camera, or make workspace.region smaller",
     )
+
+
+def check_sight(frame: RgbdFrame, arm: Arm, workspace: Workspace) -> Iterator[Finding]:
+    """Whether the arm is in the camera's sight of the region: it would be taken for the table, or a part."""
+    if arm.links is None:
+        return
+    try:
+        joints = arm.state().joints
+    except HalError:
+        return  # reported with the arm
+    if name := link_in_sight(arm.links, joints, frame, workspace):
+        at_home = np.abs(joints - workspace.home).max() <= AT_HOME
+        yield Finding(
+            level="fail",
+            subject="camera view",
+            text=f"the arm's {name} is in the camera's sight of the region: "
+            + ("choose other joints for workspace.home" if at_home else "move the arm home first"),
+        )
 
 
 def check_table(frame: RgbdFrame, workspace: Workspace) -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from hal.doctor.checks import (
     check_motion,
     check_reach,
     check_renderer,
+    check_sight,
     check_stream,
     check_table,
     check_view,
@@ -159,7 +160,8 @@ def _check_camera(cell: Cell) -> Iterator[Finding]:
         )
         return
     yield from check_view(frames[-1], cell.workspace)
-    yield from check_table(frames[-1], cell.workspace)
+    hidden = list(check_sight(frames[-1], cell.arm, cell.workspace))
+    yield from hidden or check_table(frames[-1], cell.workspace)
 
 
 def main() -> int:
