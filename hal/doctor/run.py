@@ -12,6 +12,7 @@ from rich.text import Text
 
 from hal.camera import RgbdFrame
 from hal.cell import Cell
+from hal.doctor.camera_checks import check_sight, check_stream, check_table, check_view
 from hal.doctor.checks import (
     Finding,
     attempt,
@@ -22,10 +23,6 @@ from hal.doctor.checks import (
     check_motion,
     check_reach,
     check_renderer,
-    check_sight,
-    check_stream,
-    check_table,
-    check_view,
 )
 from hal.doctor.config import DoctorConfig
 from hal.doctor.dry_run import PACE, check_dry_run
