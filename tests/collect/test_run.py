@@ -171,7 +171,7 @@ def test_stopped_killed_and_damaged_a_run_still_ends_in_the_same_bytes(collected
         ("parts: [no_such_part]", 2, "no_such_part"),
         ("camera: {height: 0.31}", 2, "the camera sees 0.14 m"),
         ("physics: {friction_table_part: -0.1}", 2, "physics.friction_table_part"),
-        ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 1, "no part is left"),
+        ("part_filter: {min_length: 1.0}\nparts: [hex_nut_m30]", 2, "no part is left"),
         ("planned_by: /nowhere\nparts: [hex_nut_m30]", 2, "no model.json in /nowhere; train a model"),
         ("planned_by: /nowhere\ncluster: auto", 2, "grasps are planned by this machine's processes alone"),
         ("planned_by: /nowhere\npart_filter: {min_success: 0.1}", 2, "these are planned: leave them out"),
