@@ -378,15 +378,14 @@ class Arm(Device):
             LoadTooHeavy: Names both masses and the remedy.
         """
         if not mass <= self.limits.max_load:
-            carried = PAYLOAD - HAND_MASS
             remedy = (
-                "leave it out, or on a real cell raise arm.contact_force and arm.contact_torque "
-                "(docs/real_cell.md)"
-                if mass <= carried
-                else f"the robot carries {carried:.3f} kg beside its hand; is the part's density right?"
+                "or on a real cell raise arm.contact_force and arm.contact_torque (docs/real_cell.md)"
+                if mass <= PAYLOAD - HAND_MASS
+                else "or check its density"  # no threshold lets the robot carry it
             )
             raise LoadTooHeavy(
-                f"the part weighs {mass:.3f} kg, this arm carries {self.limits.max_load:.3f} kg: {remedy}"
+                f"the part weighs {mass:.3f} kg, this arm carries {self.limits.max_load:.3f} kg: leave it "
+                f"out, {remedy}"
             )
 
     def _check_pose(self, limits: ArmLimits, T_base_tcp: Pose) -> None:

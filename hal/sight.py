@@ -1,4 +1,4 @@
-"""Whether an arm stands in a camera's sight of the region of the parts."""
+"""Detection of an arm in a camera's view of the region of the parts, from its joints."""
 
 from __future__ import annotations
 
